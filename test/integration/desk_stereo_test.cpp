@@ -2,9 +2,7 @@
 // The method end to end on the simulated desk, compared with the exact truth.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numeric>
+#include <iostream>
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
@@ -14,95 +12,73 @@
 namespace efm {
 namespace {
 
-class DeskStereo : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    recording_ = new test::SimulatedRecording(test::SimulatedRecording::desk());
+using test::SimulatedRecording;
+
+FusionMapperOptions optionsOf(double window_s, double stride_s) {
+  FusionMapperOptions options;
+  options.policy.window_s = window_s;
+  options.policy.stride_s = stride_s;
+  options.keyframe.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
+  return options;
+}
+
+/// The share of bad pixels over all keyframes together.
+double badShare(const FusionMapperOptions& options, const char* name) {
+  const SimulatedRecording& desk = SimulatedRecording::desk();
+  std::vector<DepthPair> all;
+  for (const KeyframeDepthMap& keyframe : desk.map(options)) {
+    const auto some = desk.pairs(keyframe);
+    all.insert(all.end(), some.begin(), some.end());
   }
-  static void TearDownTestSuite() {
-    delete recording_;
-    recording_ = nullptr;
-  }
+  const RigCamera& right = desk.simulation().rig.cameras.at(1);
+  const double bad =
+      *depthErrors(all, right.model.fx * right.T_rig_cam.translation.norm()).bad_pix_3px;
+  std::cout << name << ": bad-pix " << 100 * bad << " % of " << all.size() << " points\n";
+  return bad;
+}
 
-  static FusionMapperOptions options(double window_s, double stride_s) {
-    FusionMapperOptions options;
-    options.policy.window_s = window_s;
-    options.policy.stride_s = stride_s;
-    options.keyframe.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
-    return options;
-  }
-
-  /// As the paper has it, whose claims are tested: no groups of events, its extraction.
-  static FusionMapperOptions paperOptions(double window_s, double stride_s) {
-    FusionMapperOptions paper = options(window_s, stride_s);
-    paper.keyframe.split = SplitFusionOptions::none();
-    paper.keyframe.extraction.extraction = ExtractionMethod::kPaper;
-    return paper;
-  }
-
-  /// Over all keyframes together.
-  static DepthErrors errors(const std::vector<KeyframeDepthMap>& keyframes) {
-    std::vector<DepthPair> all;
-    for (const KeyframeDepthMap& keyframe : keyframes) {
-      const auto some = recording_->pairs(keyframe);
-      all.insert(all.end(), some.begin(), some.end());
-    }
-    const RigCamera& right = recording_->simulation().rig.cameras.at(1);
-    return depthErrors(all, right.model.fx * right.T_rig_cam.translation.norm());
-  }
-
-  static test::SimulatedRecording* recording_;
-};
-
-test::SimulatedRecording* DeskStereo::recording_ = nullptr;
-
-TEST_F(DeskStereo, EachCameraFiresAboutAMillionEvents) {
-  for (const auto& events : recording_->events()) {
+TEST(DeskStereo, EachCameraFiresAboutAMillionEvents) {
+  for (const auto& events : SimulatedRecording::desk().events()) {
     EXPECT_GE(events.size(), 800'000U);
     EXPECT_LE(events.size(), 1'200'000U);
   }
 }
 
-TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {
-  const auto keyframes = recording_->map(options(0.5, 0.25));
+TEST(DeskStereo, DepthIsGoodToAFractionOfAPlaneAndTheMapLiesOnTheTrueSurfaces) {
+  const FusionMapperOptions options = optionsOf(0.5, 0.25);
+  const SimulatedRecording& desk = SimulatedRecording::desk();
+  const auto keyframes = desk.map(options);
   ASSERT_GE(keyframes.size(), 5U);
-  const double step = DepthPlanes(options(0.5, 0.25).keyframe.planes).inverseDepthStep();
+  const double step = DepthPlanes(options.keyframe.planes).inverseDepthStep();
   double mean = 0;
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    mean += depthErrors(recording_->pairs(keyframe)).median_inverse / step /
+    mean += depthErrors(desk.pairs(keyframe)).median_inverse / step /
             static_cast<double>(keyframes.size());
   }
   std::cout << "median inverse depth error: " << mean << " plane steps, mean of "
             << keyframes.size() << " keyframes\n";
   EXPECT_LE(mean, 0.8);
+
+  const auto points = test::globalCloudOf(keyframes);
+  ASSERT_GT(points->size(), 10'000U);
+  const double median_m = desk.medianDistanceToSurfaces(*points);
+  std::cout << "map: " << points->size() << " points, median distance to the surfaces "
+            << 100 * median_m << " cm\n";
+  EXPECT_LE(median_m, 0.03);
 }
 
-TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
-  FusionMapperOptions harmonic = paperOptions(0.1, 0.1);
+TEST(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
+  // As the paper has it, whose claim is tested: no groups of events, its extraction.
+  FusionMapperOptions harmonic = optionsOf(0.1, 0.1);
+  harmonic.keyframe.split = SplitFusionOptions::none();
+  harmonic.keyframe.extraction.extraction = ExtractionMethod::kPaper;
   FusionMapperOptions arithmetic = harmonic;
   arithmetic.keyframe.sweep.fusion.across_cameras = FusionRule::kArithmetic;
   FusionMapperOptions one_camera = harmonic;
   one_camera.cameras = {0};
-  const DepthErrors of_harmonic = errors(recording_->map(harmonic));
-  const DepthErrors of_arithmetic = errors(recording_->map(arithmetic));
-  const DepthErrors of_one = errors(recording_->map(one_camera));
-  for (const auto& [name, e] :
-       {std::pair{"harmonic", of_harmonic}, std::pair{"arithmetic", of_arithmetic},
-        std::pair{"one camera", of_one}}) {
-    std::cout << name << ": bad-pix " << 100 * *e.bad_pix_3px << " % of " << e.points
-              << " points\n";
-  }
-  EXPECT_LE(*of_harmonic.bad_pix_3px, 0.85 * *of_arithmetic.bad_pix_3px);
-  EXPECT_LE(*of_harmonic.bad_pix_3px, 0.85 * *of_one.bad_pix_3px);
-}
-
-TEST_F(DeskStereo, TheMapLiesOnTheTrueSurfaces) {
-  const auto points = test::globalCloudOf(recording_->map(options(0.5, 0.25)));
-  ASSERT_GT(points->size(), 10'000U);
-  const double median_m = recording_->medianDistanceToSurfaces(*points);
-  std::cout << "map: " << points->size() << " points, median distance to the surfaces "
-            << 100 * median_m << " cm\n";
-  EXPECT_LE(median_m, 0.03);
+  const double of_harmonic = badShare(harmonic, "harmonic");
+  EXPECT_LE(of_harmonic, 0.85 * badShare(arithmetic, "arithmetic"));
+  EXPECT_LE(of_harmonic, 0.85 * badShare(one_camera, "one camera"));
 }
 
 }  // namespace

@@ -2,14 +2,13 @@
 #include "test/integration/mistakes.h"
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 
-#include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/text/event_text.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
@@ -18,11 +17,6 @@ namespace fs = std::filesystem;
 
 std::string eventsName(std::size_t camera) {
   return "cam" + std::to_string(camera) + "/events.txt";
-}
-
-void writeFile(const fs::path& file, const std::string& text) {
-  fs::create_directories(file.parent_path());
-  std::ofstream(file, std::ios::binary) << text;
 }
 
 bool areEqual(const StampedPose& a, const StampedPose& b) {
@@ -66,8 +60,7 @@ DraftRecording readDraft(const fs::path& folder) {
     }
   }
   draft.poses = readPosesFile(folder / "poses.txt");
-  std::ifstream camchain(folder / "camchain.yaml");
-  draft.camchain.assign(std::istreambuf_iterator<char>(camchain), {});
+  draft.camchain = readText(folder / "camchain.yaml");
   return draft;
 }
 

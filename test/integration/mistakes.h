@@ -44,20 +44,15 @@ DraftRecording readDraft(const std::filesystem::path& folder);
 void writeDraft(const DraftRecording& draft, const DraftRecording& base,
                 const std::filesystem::path& base_folder, const std::filesystem::path& folder);
 
-/// The exit status of `map`.
-constexpr int kFine = 0;        // with a warning
-constexpr int kJobError = 1;    // of the recording
-constexpr int kUsageError = 2;  // of the command line or the option file
-
 /// A deliberate mistake in a recording or on the command line, and what `map` says of it.
 struct Mistake {
   const char* name;
   std::function<void(DraftRecording&)> make;
-  std::string arguments;  ///< Of `map`, further ones.
-  int status;
   /// The beginning of each line on stderr, behind "event-fusion: ". A number behind ~ is met within
-  /// a fifth. "…" as the last one: others may follow from the mistake.
+  /// a fifth; a line with # is expected twice, with 0 and 1. "…" as the last one: others may
+  /// follow. With an error the exit status is 1, otherwise 0.
   std::vector<std::string> lines;
+  std::string arguments{};  ///< Of `map`, further ones.
 };
 
 /// Writes a file into the recording's folder.

@@ -71,8 +71,19 @@ TEST_F(Mistakes, AreNamedWithTheirNumbersAndNothingElseIs) {
   for (const Mistake& mistake : allMistakes()) {
     const Result result = mapWith(mistake);
     SCOPED_TRACE(mistake.name + (":\n" + result.err));
-    EXPECT_EQ(result.status, mistake.status);
-    std::vector<std::string> expected = mistake.lines;
+    std::vector<std::string> expected;
+    for (const std::string& line : mistake.lines) {
+      const std::size_t at = line.find('#');
+      expected.push_back(line);
+      if (at == std::string::npos) continue;
+      expected.back()[at] = '0';
+      expected.push_back(line);
+      expected.back()[at] = '1';
+    }
+    const bool fails = std::any_of(expected.begin(), expected.end(), [](const std::string& line) {
+      return line.rfind("error: ", 0) == 0;
+    });
+    EXPECT_EQ(result.status, fails ? 1 : 0);
     const bool exactly = expected.back() != "…";
     if (!exactly) expected.pop_back();
     std::istringstream err(result.err);
@@ -94,7 +105,7 @@ TEST_F(Mistakes, AreNamedWithTheirNumbersAndNothingElseIs) {
 }
 
 TEST_F(Mistakes, AreNotSeenWhereThereAreNone) {
-  const Result result = mapWith({"none", [](DraftRecording&) {}, "", kFine, {}});
+  const Result result = mapWith({"none", [](DraftRecording&) {}, {}});
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.err, Not(HasSubstr("warning")));
   EXPECT_EQ(reportIn("out")["warnings"].size(), 0U);

@@ -18,22 +18,16 @@ namespace {
 
 class MotionCorrectionOnTheDesk : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    recording_ = new test::SimulatedRecording(test::SimulatedRecording::desk());
-  }
-  static void TearDownTestSuite() {
-    delete recording_;
-    recording_ = nullptr;
-  }
+  static const test::SimulatedRecording& desk() { return test::SimulatedRecording::desk(); }
 
   static Window window() {
-    const std::int64_t start_ns = recording_->simulation().start_ns;
+    const std::int64_t start_ns = desk().simulation().start_ns;
     return {start_ns, start_ns + 200'000'000, start_ns + 100'000'000};
   }
 
   static Trajectory truth() {
     Trajectory trajectory;
-    for (const StampedPose& pose : recording_->poses()) trajectory.add(pose);
+    for (const StampedPose& pose : desk().poses()) trajectory.add(pose);
     return trajectory;
   }
 
@@ -42,9 +36,9 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
     options.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
     options.motion.correct_motion = correct_motion;
     options.motion.motion_rounds = 3;
-    KeyframeMapper mapper(recording_->simulation().rig, {0, 1}, options);
+    KeyframeMapper mapper(desk().simulation().rig, {0, 1}, options);
     std::vector<EventSpan> events;
-    for (const std::vector<Event>& camera : recording_->events()) {
+    for (const std::vector<Event>& camera : desk().events()) {
       const auto end = std::find_if(camera.begin(), camera.end(), [](const Event& event) {
         return event.t_ns >= window().t1_ns;
       });
@@ -56,16 +50,12 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
   /// Median of the relative depth errors.
   static double error(const KeyframeDepthMap& keyframe) {
     std::vector<double> errors;
-    for (const DepthPair& pair : recording_->pairs(keyframe)) {
+    for (const DepthPair& pair : desk().pairs(keyframe)) {
       errors.push_back(std::abs(pair.estimate_m / pair.truth_m - 1));
     }
     return upperMedian(errors);
   }
-
-  static test::SimulatedRecording* recording_;
 };
-
-test::SimulatedRecording* MotionCorrectionOnTheDesk::recording_ = nullptr;
 
 TEST_F(MotionCorrectionOnTheDesk, AWrongVelocityIsFoundAndDepthIsNearlyThatOfExactPoses) {
   const Eigen::Vector3d linear_m_s = 0.05 * Eigen::Vector3d(2, -1, 1).normalized();

@@ -14,28 +14,44 @@
 
 namespace efm::test {
 
-SimulatedRecording::SimulatedRecording(Simulation simulation)
-    : simulation_(std::move(simulation)), poses_(samplePoses(simulation_)) {}
+namespace {
 
-SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
-    : SimulatedRecording(makeSimulation(options)) {
-  for (CameraRecording& recording : simulateEvents(simulation_)) {
-    events_.push_back(std::move(recording.events));
+std::vector<std::vector<Event>> eventsOf(const Simulation& simulation) {
+  std::vector<std::vector<Event>> events;
+  for (CameraRecording& camera : simulateEvents(simulation)) {
+    events.push_back(std::move(camera.events));
   }
+  return events;
 }
 
-SimulatedRecording SimulatedRecording::desk() {
-  SimulatedRecording desk(makeSimulation({"desk_stereo", std::nullopt, 1}));
-  desk.events_.resize(desk.simulation_.rig.cameras.size());
+std::vector<std::vector<Event>> eventsOfDesk() {
+  std::vector<std::vector<Event>> events(2);
   RecordingSource source;
   source.files = {EFM_RECORDINGS "/desk_stereo"};
   const auto recording = openRecording(source);
   while (const auto sample = recording->next()) {
     const auto* packet = std::get_if<EventPacket>(&*sample);
     if (!packet) continue;
-    auto& events = desk.events_.at(static_cast<std::size_t>(packet->camera));
-    events.insert(events.end(), packet->events.begin(), packet->events.end());
+    auto& camera = events.at(static_cast<std::size_t>(packet->camera));
+    camera.insert(camera.end(), packet->events.begin(), packet->events.end());
   }
+  return events;
+}
+
+}  // namespace
+
+SimulatedRecording::SimulatedRecording(Simulation simulation,
+                                       std::vector<std::vector<Event>> events)
+    : simulation_(std::move(simulation)),
+      events_(std::move(events)),
+      poses_(samplePoses(simulation_)) {}
+
+SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
+    : SimulatedRecording(makeSimulation(options), eventsOf(makeSimulation(options))) {}
+
+const SimulatedRecording& SimulatedRecording::desk() {
+  static const SimulatedRecording desk(makeSimulation({"desk_stereo", std::nullopt, 1}),
+                                       eventsOfDesk());
   return desk;
 }
 

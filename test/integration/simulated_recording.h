@@ -15,9 +15,11 @@ namespace efm::test {
 class SimulatedRecording {
  public:
   explicit SimulatedRecording(const SimulationOptions& options);
+  /// @param events of each camera of the simulation.
+  SimulatedRecording(Simulation simulation, std::vector<std::vector<Event>> events);
   /// desk_stereo with seed 1, simulated once for all tests (the fixture `recordings` of ctest).
   /// @throws std::runtime_error where it has not been simulated.
-  static SimulatedRecording desk();
+  static const SimulatedRecording& desk();
 
   const Simulation& simulation() const { return simulation_; }
   const std::vector<std::vector<Event>>& events() const { return events_; }  ///< Per camera.
@@ -36,8 +38,6 @@ class SimulatedRecording {
   double shareBeyond(const MapCloud& cloud, double distance_m) const;
 
  private:
-  explicit SimulatedRecording(Simulation simulation);
-
   Simulation simulation_;
   std::vector<std::vector<Event>> events_;
   std::vector<StampedPose> poses_;

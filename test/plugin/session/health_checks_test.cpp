@@ -103,7 +103,6 @@ void delay(SyntheticRecording& recording, std::int64_t delay_ns) {
 }
 
 const std::vector<Fault> kFaults = {
-    {"none", [](auto&) {}, ""},
     {"poses a second late", [](auto& r) { delay(r, 1'000'000'000); },
      "clock-overlap: the poses cover 50.1 % of the events' time: events from 10.002000000 to "},
     {"a tenth late", [](auto& r) { delay(r, 204'000'000); },
@@ -167,9 +166,6 @@ TEST(HealthChecks, OtherUnitsOfTimeAreGuessed) {
       EXPECT_THAT(linesOf(warningsOf(recording)), Contains(HasSubstr(expected)));
     }
   }
-  SyntheticRecording recording = soundRecording();
-  delay(recording, 1'000'000'000);
-  EXPECT_THAT(linesOf(warningsOf(recording)), Contains(HasSubstr("have they one clock")));
 }
 
 /// The warnings of cameras that have no events.
@@ -186,60 +182,53 @@ TEST(HealthChecks, CamerasHaveLimits) {
     std::function<void(RigCamera&)> change;  // of camera 1 of three
     const char* expected;
   };
-  const auto baseline = [](double x, double y, double z) {
-    return [=](RigCamera& camera) { camera.T_rig_cam.translation = {x, y, z}; };
-  };
-  const auto focal = [](double fx, bool fisheye) {
-    return [=](RigCamera& camera) {
-      camera.model.fx = fx;
-      if (!fisheye) return;
-      camera.model.fy = fx;
-      camera.model.height = 40;  // the corners have rays
-      camera.model.cy = 20;
-      camera.model.distortion = DistortionModel::kEquidistant;
-      camera.model.coefficients = {0, 0, 0, 0};
-    };
-  };
-  const auto middle = [](double cx, double cy) {
-    return [=](RigCamera& camera) {
-      camera.model.cx = cx;
-      camera.model.cy = cy;
-    };
-  };
-  const auto folded = [](double k1, double k2) {
-    return [=](RigCamera& camera) {
-      camera.model.distortion = DistortionModel::kRadtan;
-      camera.model.coefficients = {k1, k2, 0, 0};
-    };
+  const auto distort = [](RigCamera& camera, DistortionModel model, double k1) {
+    camera.model.distortion = model;
+    camera.model.coefficients = {k1, 0, 0, 0};
   };
   const Row rows[] = {
       {[](auto&) {}, ""},
-      {baseline(0, 0.005, 0), ""},
-      {baseline(0, 0, 0.0049),
+      {[](auto& c) {
+         c.T_rig_cam.translation = {0, 0.005, 0};
+       },
+       ""},
+      {[](auto& c) {
+         c.T_rig_cam.translation = {0, 0, 0.0049};
+       },
        "baseline: cameras 0 and 1 are 0.0049 m apart: expected 0.005 to 20 m;"},
-      {baseline(19.5, 0, 0), ""},
-      {baseline(20.1, 0, 0), "baseline: cameras 0 and 1 are 20.1 m apart"},
-      {focal(1370, false), ""},
-      {focal(1380, false),
+      {[](auto& c) {
+         c.T_rig_cam.translation = {19.5, 0, 0};
+       },
+       ""},
+      {[](auto& c) {
+         c.T_rig_cam.translation = {20.1, 0, 0};
+       },
+       "baseline: cameras 0 and 1 are 20.1 m apart"},
+      {[](auto& c) { c.model.fx = 1370; }, ""},
+      {[](auto& c) { c.model.fx = 1380; },
        "focal-length: camera 1: a focal length of 1380 px and 120 columns are a field of view of "
        "4.98 degrees: expected 5 to 170;"},
-      {focal(5.3, false), ""},
-      {focal(5.2, false),
+      {[](auto& c) { c.model.fx = 5.3; }, ""},
+      {[](auto& c) { c.model.fx = 5.2; },
        "focal-length: camera 1: a focal length of 5.2 px and 120 columns are "
        "a field of view of 170 degrees"},
-      {focal(40, true), ""},
-      {middle(30, 22.5), ""},
-      {middle(90, 67.5), ""},
-      {middle(29.9, 45),
+      {[&](auto& c) {  // whose corners have rays
+         c.model = {120, 40, 40, 40, 59.5, 20, DistortionModel::kNone, {}};
+         distort(c, DistortionModel::kEquidistant, 0);
+       },
+       ""},
+      {[](auto& c) { c.model.cx = 30, c.model.cy = 22.5; }, ""},
+      {[](auto& c) { c.model.cx = 90, c.model.cy = 67.5; }, ""},
+      {[](auto& c) { c.model.cx = 29.9, c.model.cy = 45; },
        "principal-point: camera 1: the principal point (29.9, 45) lies outside "
        "the middle half of the 120x90 pixels"},
-      {middle(90.1, 45), "principal-point: "},
-      {middle(60, 22.4), "principal-point: "},
-      {middle(60, 67.6), "principal-point: "},
-      {folded(-1.5, 0),
+      {[](auto& c) { c.model.cx = 90.1, c.model.cy = 45; }, "principal-point: "},
+      {[](auto& c) { c.model.cx = 60, c.model.cy = 22.4; }, "principal-point: "},
+      {[](auto& c) { c.model.cx = 60, c.model.cy = 67.6; }, "principal-point: "},
+      {[&](auto& c) { distort(c, DistortionModel::kRadtan, -1.5); },
        "lens: camera 1: the lens model has no viewing ray for 72 % of the pixels; are the "
        "coefficients in the order of the model 'radtan'?"},
-      {folded(-0.3, 0), ""},
+      {[&](auto& c) { distort(c, DistortionModel::kRadtan, -0.3); }, ""},
   };
   for (const Row& row : rows) {
     std::vector<RigCamera> cameras = SyntheticRecording(0.01, 3).cameras;
@@ -591,15 +580,13 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        "events-lost: 6.5 % of the events were lost; 3 windows given up: 3 "},
       {live([](auto& s) { s.live->cameras[1].thinned = 1; }),
        "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
-       "[live] "
-       "max_event_rate lets pass"},
+       "[live] max_event_rate lets pass"},
       {live([](auto& s) {
          s.live->cameras[1].thinned = 1;
          s.live->too_large = "a window needs 5 events";
        }),
        "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
-       "[live] "
-       "max_event_rate lets pass; a window needs 5 events"},
+       "[live] max_event_rate lets pass; a window needs 5 events"},
       {live([](auto& s) { s.live->cameras[1].dropped = 3; }),
        "events-lost: 1.5 % of the events were lost; 0 windows given up; the machine is too slow"},
       {live([](auto& s) {
