@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -54,6 +55,19 @@ struct Mistake {
   std::vector<std::string> lines;
   std::string arguments{};  ///< Of `map`, further ones.
 };
+
+/// The lines where poses and events are never at the same time, with others.
+/// @param spans of the events and of the poses, the hint of the warning, the seconds between both.
+inline std::vector<std::string> apart(const std::array<std::string, 4>& spans,
+                                      std::vector<std::string> lines = {}) {
+  const auto& [events, poses, hint, gap_s] = spans;
+  lines.push_back(
+      "warning: clock-overlap: the poses cover 0.0 % of the events' time: events from " + events +
+      ", poses from " + poses + hint);
+  lines.push_back("error: there is no keyframe: the events span " + events + ", the poses " +
+                  poses + ": they miss each other by " + gap_s + " s");
+  return lines;
+}
 
 /// Writes a file into the recording's folder.
 inline std::function<void(DraftRecording&)> file(const std::string& name, const std::string& text) {
