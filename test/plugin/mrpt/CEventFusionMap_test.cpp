@@ -8,13 +8,10 @@
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfObjects.h>
-#include <mrpt/serialization/CArchive.h>
-#include <mrpt/serialization/archiveFrom_std_vector.h>
 
 #include <random>
 
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/mrpt/registration.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -26,7 +23,6 @@ using mrpt::maps::CMultiMetricMap;
 using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 using testing::HasSubstr;
-using Bytes = std::vector<std::uint8_t>;
 
 StoredKeyframe randomKeyframe(unsigned seed, int count = 200) {
   std::mt19937 random(seed);
@@ -63,21 +59,6 @@ CEventFusionMap mapOf(unsigned keyframes, const GlobalCloudOptions& options = bi
 
 void expectSamePoints(const CEventFusionMap& a, const CEventFusionMap& b) {
   expectSameBits(a.cloud().points(), b.cloud().points());
-}
-
-template <typename Object>
-Bytes bytesOf(const Object& object) {
-  Bytes bytes;
-  auto archive = mrpt::serialization::archiveFrom(bytes);
-  archive << object;
-  return bytes;
-}
-
-template <typename Object>
-std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
-  registerClasses();
-  auto archive = mrpt::serialization::archiveFrom(bytes);
-  return std::dynamic_pointer_cast<Object>(archive.ReadObject());
 }
 
 /// Made as MRPT's programs make their maps.
@@ -209,7 +190,7 @@ TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChange) {
 }
 
 TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
-  // No option is the default, and each decides which points there are.
+  // No option is the default.
   GlobalCloudOptions options = bigVoxels();
   options.voxel_size_m = 2;
   options.min_keyframes = 2;

@@ -3,15 +3,39 @@
 
 #include <gtest/gtest.h>
 #include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/serialization/CArchive.h>
+#include <mrpt/serialization/archiveFrom_std_vector.h>
 
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/registration.h"
 #include "test/plugin/session/mapper_driver.h"
 
 namespace efm {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// The object as an archive of MRPT stores it.
+template <typename Object>
+Bytes bytesOf(const Object& object) {
+  Bytes bytes;
+  auto archive = mrpt::serialization::archiveFrom(bytes);
+  archive << object;
+  return bytes;
+}
+
+/// The object by its class's name, as from a rawlog.
+template <typename Object>
+std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
+  registerClasses();
+  auto archive = mrpt::serialization::archiveFrom(bytes);
+  return std::dynamic_pointer_cast<Object>(archive.ReadObject());
+}
 
 /// A packet of events as in a rawlog.
 inline CObservationEvents::Ptr observationOf(const EventPacket& packet) {

@@ -57,6 +57,13 @@ double angleBetween(const Rigid3& a, const Rigid3& b) {
   return 2 * (a.rotation.conjugate() * b.rotation).vec().norm();
 }
 
+Eigen::Vector3d drawn(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const double x = normal(random);
+  const double y = normal(random);
+  return {x, y, normal(random)};
+}
+
 /// A random pose.
 /// @param from_vertical if not 0, the standard deviation of the pitch from 90 degrees, where MRPT's
 /// angles are singular.
@@ -64,7 +71,7 @@ Rigid3 randomPose(std::mt19937& random, double from_vertical) {
   std::normal_distribution<double> normal;
   const auto draw = [&] { return normal(random); };
   Rigid3 pose;
-  pose.translation = {draw(), draw(), draw()};
+  pose.translation = drawn(random);
   pose.rotation = Eigen::Quaterniond(draw(), draw(), draw(), draw()).normalized();
   if (from_vertical == 0) return pose;
   pose.rotation = Eigen::AngleAxisd(draw(), Eigen::Vector3d::UnitZ()) *
@@ -90,13 +97,6 @@ TEST(MrptPoseOf, IsTheSameAfterARoundTripAndAfterAnArchive) {
       ASSERT_LT(angleBetween(rigidFrom(same), T_a_b), 1e-14) << kFromVertical[i % 4];
     }
   }
-}
-
-Eigen::Vector3d drawn(std::mt19937& random) {
-  std::normal_distribution<double> normal;
-  const double x = normal(random);
-  const double y = normal(random);
-  return {x, y, normal(random)};
 }
 
 /// x, y, z, yaw, pitch and roll, as MRPT has them.

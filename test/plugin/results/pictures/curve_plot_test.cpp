@@ -39,20 +39,17 @@ TEST(PlotAxis, TicksAreRoundNumbersAndOnLogarithmicAxesPowersOfTenOrValuesBetwee
       << "a short axis: evenly apart";
 }
 
-TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
+TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengthsAnInverseOneEqualInverses) {
   const AxisRange range{1, 100, AxisScale::kLogarithmic};
   EXPECT_DOUBLE_EQ(range.fractionAlong(10), 0.5);
   EXPECT_TRUE(std::isnan(range.fractionAlong(0)));
   EXPECT_TRUE(std::isnan(range.fractionAlong(-1)));
-}
-
-TEST(PlotAxis, AnInverseAxisHasRoundTicksThatLeaveEachOtherSpace) {
-  const AxisRange range{0.77, 6.4, AxisScale::kInverse};
-  EXPECT_DOUBLE_EQ(range.fractionAlong(0.77), 0);
-  EXPECT_DOUBLE_EQ(range.fractionAlong(6.4), 1);
-  EXPECT_NEAR(range.fractionAlong(2 / (1 / 0.77 + 1 / 6.4)), 0.5, 1e-12);
-  EXPECT_TRUE(std::isnan(range.fractionAlong(0)));
-  EXPECT_THAT(textsOf(range, 6), ElementsAre("0.8", "1", "2", "5"));
+  const AxisRange inverse{0.77, 6.4, AxisScale::kInverse};  // equal steps of the inverse
+  EXPECT_DOUBLE_EQ(inverse.fractionAlong(0.77), 0);
+  EXPECT_DOUBLE_EQ(inverse.fractionAlong(6.4), 1);
+  EXPECT_NEAR(inverse.fractionAlong(2 / (1 / 0.77 + 1 / 6.4)), 0.5, 1e-12);
+  EXPECT_TRUE(std::isnan(inverse.fractionAlong(0)));
+  EXPECT_THAT(textsOf(inverse, 6), ElementsAre("0.8", "1", "2", "5"));
   EXPECT_THAT(textsOf({1.05, 1.35, AxisScale::kInverse}, 3), ElementsAre("1.1", "1.2", "1.3"));
 }
 
