@@ -19,11 +19,6 @@ std::string eventsName(std::size_t camera) {
   return "cam" + std::to_string(camera) + "/events.txt";
 }
 
-bool areEqual(const StampedPose& a, const StampedPose& b) {
-  return a.t_ns == b.t_ns && a.T_world_rig.translation == b.T_world_rig.translation &&
-         a.T_world_rig.rotation.coeffs() == b.T_world_rig.rotation.coeffs();
-}
-
 }  // namespace
 
 void DraftRecording::usualLine(const Event& event, std::string& text) {
@@ -80,8 +75,9 @@ void writeDraft(const DraftRecording& draft, const DraftRecording& base,
         draft.event_line == base.event_line && draft.events[camera] == base.events[camera];
     linkOr(same, eventsName(camera), [&] { return draft.eventText(camera); });
   }
-  const bool same_poses = std::equal(draft.poses.begin(), draft.poses.end(), base.poses.begin(),
-                                     base.poses.end(), areEqual);
+  const bool same_poses = std::equal(
+      draft.poses.begin(), draft.poses.end(), base.poses.begin(), base.poses.end(),
+      [](auto& a, auto& b) { return a.t_ns == b.t_ns && isSame(a.T_world_rig, b.T_world_rig); });
   linkOr(same_poses, "poses.txt", [&] { return draft.poseText(); });
   linkOr(draft.camchain == base.camchain, "camchain.yaml", [&] { return draft.camchain; });
   for (const auto& [name, text] : draft.files) writeFile(folder / name, text);
