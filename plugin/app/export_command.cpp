@@ -20,13 +20,9 @@
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/writers/mcap_writer.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
-#ifdef EFM_WITH_HDF5
-#include "plugin/recordings/writers/hdf5_writer.h"
-#endif
 
 namespace efm {
 namespace {
@@ -108,17 +104,12 @@ struct ExportFormat {
   std::unique_ptr<RecordingWriter> (*open)(const std::filesystem::path&, const Rig&);
 };
 
-template <typename Writer>
-std::unique_ptr<RecordingWriter> openWriter(const std::filesystem::path& out, const Rig& rig) {
-  return std::make_unique<Writer>(out, rig);
-}
-
 const std::vector<ExportFormat>& formats() {
   static const std::vector<ExportFormat> all = {
-      {"folder", openWriter<FolderWriter>},
-      {"mcap", openWriter<McapWriter>},
+      {"folder", openFolderWriter},
+      {"mcap", openMcapWriter},
 #ifdef EFM_WITH_HDF5
-      {"dsec", openWriter<Hdf5Writer>},
+      {"dsec", openHdf5Writer},
 #endif
   };
   return all;

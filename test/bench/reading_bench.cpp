@@ -24,7 +24,7 @@
 #include "test/bench/synthetic_window.h"
 #include "test/plugin/recordings/sensors/evt_words.h"
 #ifdef EFM_WITH_HDF5
-#include "plugin/recordings/writers/hdf5_writer.h"
+#include "plugin/recordings/writers/recording_writer.h"
 #endif
 
 namespace efm::bench {
@@ -121,10 +121,10 @@ void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
 #ifdef EFM_WITH_HDF5
 /// The same in DSEC's layout: HDF5, Blosc with Zstandard.
 void writeHdf5(const fs::path& folder, const SyntheticWindow& made) {
-  Hdf5Writer writer(folder, {{made.rig.cameras.front()}});
-  writer.addEvents(0, made.events.front());
-  writer.addPose({1'000'000'000, {}});
-  writer.close();
+  const auto writer = openHdf5Writer(folder, {{made.rig.cameras.front()}});
+  writer->addEvents(0, made.events.front());
+  writer->addPose({1'000'000'000, {}});
+  writer->close();
 }
 #endif
 

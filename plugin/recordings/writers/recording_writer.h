@@ -73,22 +73,32 @@ class RecordingWriter {
 
 /// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0);
 /// depth/ with the truth. What the recording lacks is left out.
-class FolderWriter : public RecordingWriter {
- public:
-  /// @param rig whose frame is that of camera 0.
-  /// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
-  FolderWriter(const std::filesystem::path& folder, const Rig& rig);
+/// @param rig whose frame is that of camera 0.
+/// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
+std::unique_ptr<RecordingWriter> openFolderWriter(const std::filesystem::path& folder,
+                                                  const Rig& rig);
 
-  void addEvents(std::size_t camera, const std::vector<Event>& events) override;
-  void addPose(const StampedPose& pose) override;
-  void addTruth(std::int64_t t_ns, const std::filesystem::path& file) override;
-  void close() override;
+/// Writes an MCAP file as rosbag2 has it (CDR messages, ros2msg schemas, zstd chunks of 1 MiB,
+/// index and checksums):
+///   /camN/events       event_camera_msgs/EventPacket, encoding mono: the times are exact (ns), and
+///                      event_camera_py and our reader decode it
+///   /camN/camera_info  sensor_msgs/CameraInfo, once, of a calibrated camera
+///   /pose              geometry_msgs/PoseStamped, T_world_rig
+/// The cameras' poses on the rig have no message: a rig of several cameras needs a calibration
+/// file. Times that a ROS message cannot hold (before 0, or from 2^31 s on), and rows above 32767,
+/// are errors.
+/// @param rig whose frame is that of the poses.
+std::unique_ptr<RecordingWriter> openMcapWriter(const std::filesystem::path& file, const Rig& rig);
 
- private:
-  NewFolder folder_;
-  std::vector<TextFile> events_;  // per camera
-  PoseTextFile poses_;
-  std::unique_ptr<TextFile> truth_;  // the index, if there is any
-};
+/// Writes a folder in DSEC's layout: events/left/events.h5, events/right/events.h5, further cameras
+/// events/cam2/events.h5, …; camchain.yaml; poses.txt (T_world_cam0, TUM). A file has /events/x and
+/// y (uint16), p (uint8), t (uint32, microseconds since /t_offset, the first event) and /ms_to_idx
+/// (uint64: the first event of each millisecond of t). Times that are not whole microseconds, or
+/// later than 2^32 microseconds (71 minutes) after the first one, are errors. Exists only in builds
+/// with HDF5.
+/// @param rig whose frame is that of camera 0.
+/// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
+std::unique_ptr<RecordingWriter> openHdf5Writer(const std::filesystem::path& folder,
+                                                const Rig& rig);
 
 }  // namespace efm

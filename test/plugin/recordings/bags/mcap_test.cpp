@@ -17,7 +17,7 @@
 #include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/writers/mcap_writer.h"
+#include "plugin/recordings/writers/recording_writer.h"
 #include "test/plugin/recordings/bags/bag_bytes.h"
 #include "test/plugin/recordings/bags/ros_message_bytes.h"
 #include "test/plugin/recordings/streams/reading.h"
@@ -44,7 +44,7 @@ class Mcap : public TemporaryFolder {
   void write(int events_per_packet) {
     std::mt19937 random(1);
     events_.clear();
-    McapWriter writer(file_, rig_);
+    const auto writer = openMcapWriter(file_, rig_);
     for (std::int64_t packet = 0; packet < 200; ++packet) {
       std::vector<Event> events;
       for (std::int64_t i = 0; i < events_per_packet; ++i) {
@@ -52,12 +52,12 @@ class Mcap : public TemporaryFolder {
                           static_cast<std::uint16_t>(random() % 640),
                           static_cast<std::uint16_t>(random() % 480), (random() & 1U) != 0});
       }
-      writer.addEvents(0, events);
-      writer.addPose({kFirstNs + packet * 10'000'000, T_world_rig_});
+      writer->addEvents(0, events);
+      writer->addPose({kFirstNs + packet * 10'000'000, T_world_rig_});
       events_.insert(events_.end(), events.begin(), events.end());
     }
     EXPECT_FALSE(std::filesystem::exists(file_)) << "before it is complete";
-    writer.close();
+    writer->close();
   }
   RecordingParts open() const { return openBags({file_}, {}); }
   std::string errorOfBytes(const std::string& bytes) const {
@@ -92,24 +92,24 @@ TEST_F(Mcap, WhatIsWrittenIsReadBackAlsoWithoutASummary) {
 }
 
 TEST_F(Mcap, LongPacketsAreDivided) {
-  McapWriter writer(file_, rig_);
+  const auto writer = openMcapWriter(file_, rig_);
   std::vector<Event> events;
   for (std::int64_t i = 0; i < 300'000; ++i) events.push_back({kFirstNs + i * 40'000, 1, 2, true});
-  writer.addEvents(0, events);  // 12 s
-  writer.close();
+  writer->addEvents(0, events);  // 12 s
+  writer->close();
   EXPECT_TRUE(readStream(*open().cameras.at(0)) == events);
 }
 
 TEST_F(Mcap, ValuesThatRosCannotHoldAreErrors) {
-  McapWriter writer(file_, rig_);
+  const auto writer = openMcapWriter(file_, rig_);
   for (const auto& [event, expected] :
        {std::make_pair(Event{-1, 0, 0, true}, "expected 0 to 2147483647"),
         std::make_pair(Event{2'147'483'648'000'000'000, 0, 0, true}, "expected 0 to 2147483647"),
         std::make_pair(Event{0, 0, 0x8000, true}, "y = 32768: expected at most 32767")}) {
-    EXPECT_THAT(errorOf([&, event = event] { writer.addEvents(0, {event}); }),
+    EXPECT_THAT(errorOf([&, event = event] { writer->addEvents(0, {event}); }),
                 AllOf(StartsWith(file_.string()), HasSubstr(expected)));
   }
-  EXPECT_NO_THROW(writer.addEvents(0, {{2'147'483'647'999'999'999, 0x7FFF, 0x7FFF, true}}));
+  EXPECT_NO_THROW(writer->addEvents(0, {{2'147'483'647'999'999'999, 0x7FFF, 0x7FFF, true}}));
 }
 
 TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
@@ -149,12 +149,12 @@ TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
 
 TEST_F(Mcap, DamageAmongThePosesIsToldAfterAllEvents) {
   write(200);
-  McapWriter writer(file_, rig_);
-  writer.addEvents(0, events_);
+  const auto writer = openMcapWriter(file_, rig_);
+  writer->addEvents(0, events_);
   for (std::int64_t i = 0; i < 20'000; ++i) {
-    writer.addPose({kFirstNs + i * 100'000, T_world_rig_});  // chunks of their own
+    writer->addPose({kFirstNs + i * 100'000, T_world_rig_});  // chunks of their own
   }
-  writer.close();
+  writer->close();
   std::string bytes = readText(file_);
   const std::size_t data_end = bytes.rfind(std::string("\x0f\4\0\0\0\0\0\0\0", 9));
   bytes[bytes.rfind("zstd", data_end) + 1'000] ^= 1;
@@ -260,14 +260,14 @@ TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
     packet.push_back({kFirstNs + i, static_cast<std::uint16_t>(i % 640),
                       static_cast<std::uint16_t>(i % 480), i % 3 == 0});
   }
-  McapWriter writer(file_, rig_);
-  writer.addPose({kFirstNs + 50'000, T_world_rig_});
+  const auto writer = openMcapWriter(file_, rig_);
+  writer->addPose({kFirstNs + 50'000, T_world_rig_});
   std::map<std::string, std::vector<std::string>> expected;
   expected["/pose"] = {poseStamped(RosBytes::kCdr, kFirstNs + 50'000, T_world_rig_)};
   for (std::uint64_t i = 0; i < 6; ++i) {  // 320 kB each
     const std::string name = i == 3 ? "cam1" : "cam0";
     const std::uint64_t sequence = i == 3 ? 0 : i > 3 ? i - 1 : i;
-    writer.addEvents(i == 3 ? 1 : 0, packet);
+    writer->addEvents(i == 3 ? 1 : 0, packet);
     expected["/" + name + "/events"].push_back(RosMessage(RosBytes::kCdr)
                                                    .header(kFirstNs, name)
                                                    .u32(i == 3 ? 65'535 : 480)
@@ -285,7 +285,7 @@ TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   info.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1, 500, 0, 320.5, 0, 0, 501, 240.5, 0, 0, 0, 1, 0});
   for (int i = 0; i < 6; ++i) info.u32(0);
   expected["/cam0/camera_info"] = {info.u8(0).bytes()};
-  writer.close();
+  writer->close();
 
   const std::string bytes = readText(file_);
   const auto at = [](const std::string& text, std::size_t position = 0) {
