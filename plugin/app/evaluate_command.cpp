@@ -34,13 +34,6 @@ std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& argum
   return stereo;
 }
 
-TrajectoryAlignment alignmentOf(const std::string& name) {
-  if (name == "se3") return TrajectoryAlignment::kSe3;
-  if (name == "origin") return TrajectoryAlignment::kOrigin;
-  if (name == "none") return TrajectoryAlignment::kNone;
-  throw std::invalid_argument("--align " + name + ": expected se3, origin or none");
-}
-
 /// @param inputs files, or folders whose files are read.
 void refusePlotOver(const EvaluationOutput& output,
                     const std::vector<std::filesystem::path>& inputs) {
@@ -84,7 +77,7 @@ int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
   refusePlotOver(arguments.output, {arguments.estimate, arguments.truth});
   using Unit = RelativeSpacing::Unit;
   TrajectoryEvaluationOptions options = arguments.options;
-  options.alignment = alignmentOf(arguments.alignment);
+  options.alignment = valueIn(kTrajectoryAlignments, arguments.alignment);
   for (const auto& [unit, amounts] : {std::pair{Unit::kFrames, &arguments.frames},
                                       {Unit::kSeconds, &arguments.deltas_s},
                                       {Unit::kMetres, &arguments.lengths_m}}) {

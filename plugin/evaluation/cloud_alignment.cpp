@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/evaluation/cloud_alignment.h"
+#include "plugin/evaluation/cloud_evaluation.h"
 
 #include <fmt/format.h>
 #include <pcl/console/print.h>

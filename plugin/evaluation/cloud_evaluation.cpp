@@ -8,7 +8,6 @@
 #include <array>
 #include <stdexcept>
 
-#include "mapping/geometry/rigid3.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/evaluation/depth_series.h"
 #include "plugin/evaluation/text_table.h"

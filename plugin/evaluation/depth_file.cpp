@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/named_choice.h"
@@ -17,6 +19,9 @@
 
 namespace efm {
 namespace {
+
+/// The maximum width and height of a PFM or NumPy image. More means a damaged header.
+constexpr std::uint64_t kMaxImageSide = 65535;
 
 std::string kindOf(const cv::Mat& image) {
   constexpr const char* kDepths[] = {"8-bit",  "signed 8-bit", "16-bit", "signed 16-bit",
@@ -49,6 +54,99 @@ cv::Mat1f parsePng(const std::string& bytes, std::optional<double> scale) {
   std::transform(image.begin<std::uint16_t>(), image.end<std::uint16_t>(), depth_m.begin(),
                  [&](std::uint16_t units) { return static_cast<float>(units / units_per_m); });
   return depth_m;
+}
+
+cv::Size imageSizeOf(const NpyHeader& header) {
+  bool is_image = header.shape.size() == 2;
+  for (const std::uint64_t side : header.shape) {
+    is_image = is_image && side >= 1 && side <= kMaxImageSide;
+  }
+  if (!is_image) {
+    throw std::runtime_error(
+        fmt::format("the array's header: shape = '({})': expected (rows, columns), each from 1 to "
+                    "65535",
+                    fmt::join(header.shape, ", ")));
+  }
+  return {static_cast<int>(header.shape[1]), static_cast<int>(header.shape[0])};
+}
+
+/// The image of a NumPy array (`parseNpyHeader`): two dimensions, [row][column], float32 or
+/// float64 of either byte order, in C order. Doubles are rounded to float.
+cv::Mat1f parseNpy(std::string_view bytes) {
+  const NpyHeader header = parseNpyHeader(bytes);
+  requirePlainRows(header);
+  if (header.type != NumberType::kFloat32 && header.type != NumberType::kFloat64) {
+    throw std::runtime_error(
+        fmt::format("the array's header: descr = '{}': expected float32 or float64", header.descr));
+  }
+  const cv::Size size = imageSizeOf(header);
+  const std::string_view data = bytes.substr(header.data_begin);
+  const std::size_t step = sizeOf(header.type);
+  if (data.size() != header.bytes()) {
+    throw std::runtime_error(
+        fmt::format("{} bytes follow the array's header: expected {} for {}x{} float{}",
+                    data.size(), header.bytes(), size.width, size.height, 8 * step));
+  }
+  cv::Mat1f image(size);
+  const char* at = data.data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, header.type, header.big_endian));
+    at += step;
+  }
+  return image;
+}
+
+int side(const WordLine& line, std::size_t word) {
+  const std::uint64_t pixels = line.count(word);
+  if (pixels < 1 || pixels > kMaxImageSide) {
+    line.refuse(fmt::format("{} pixels: expected from 1 to 65535", pixels));
+  }
+  return static_cast<int>(pixels);
+}
+
+double scaleOf(const WordLine& line) {
+  double scale = 0;
+  if (line.words.size() == 1) scale = parseFinite(line.words[0]).value_or(0);
+  if (scale == 0) {
+    line.refuse("expected one number, the scale, below 0 where the data are little endian");
+  }
+  return scale;
+}
+
+/// Whether these are the first bytes of a PFM ("portable float map", Debevec), grey or coloured.
+bool looksLikePfm(std::string_view bytes) {
+  return bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == 'f' || bytes[1] == 'F') &&
+         (bytes[2] == '\n' || bytes[2] == '\r' || bytes[2] == ' ');
+}
+
+/// The image of a grey PFM: lines "Pf", "width height" and "scale", then float32 rows from the
+/// bottom upwards, little endian if the scale is negative. As in stereo benchmarks (Middlebury),
+/// the size of the scale has no effect. (OpenCV's reader divides by it and refuses CRLF line ends.)
+cv::Mat1f parsePfm(std::string_view bytes) {
+  TextScanner cursor(bytes);
+  const WordLine kind = wordLine(cursor, "Pf");
+  if (kind.words.size() != 1 || kind.words[0] != "Pf") {
+    kind.refuse("expected Pf alone, a grey float map");
+  }
+  const WordLine sides = wordLine(cursor, "width and height");
+  if (sides.words.size() != 2) sides.refuse("expected width and height");
+  const int width = side(sides, 0);
+  const int height = side(sides, 1);
+  const bool big_endian = scaleOf(wordLine(cursor, "the scale")) > 0;
+
+  cv::Mat1f image(height, width);
+  const std::size_t expected = image.total() * sizeof(float);
+  if (cursor.left() != expected) {
+    cursor.refuse(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
+                              expected, width, height));
+  }
+  const char* at = cursor.take(expected).data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, NumberType::kFloat32, big_endian));
+    at += sizeof(float);
+  }
+  cv::flip(image, image, 0);
+  return image;
 }
 
 cv::Mat1f parseDepth(const std::string& bytes, std::optional<double> png_scale) {
@@ -88,101 +186,6 @@ cv::Mat1b readMaskFile(const std::filesystem::path& file) {
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read the mask " + file.string() + ": " + error.what());
   }
-}
-
-namespace {
-
-cv::Size imageSizeOf(const NpyHeader& header) {
-  bool is_image = header.shape.size() == 2;
-  for (const std::uint64_t side : header.shape) {
-    is_image = is_image && side >= 1 && side <= kMaxImageSide;
-  }
-  if (!is_image) {
-    throw std::runtime_error(
-        fmt::format("the array's header: shape = '({})': expected (rows, columns), each from 1 to "
-                    "65535",
-                    fmt::join(header.shape, ", ")));
-  }
-  return {static_cast<int>(header.shape[1]), static_cast<int>(header.shape[0])};
-}
-
-}  // namespace
-
-cv::Mat1f parseNpy(std::string_view bytes) {
-  const NpyHeader header = parseNpyHeader(bytes);
-  requirePlainRows(header);
-  if (header.type != NumberType::kFloat32 && header.type != NumberType::kFloat64) {
-    throw std::runtime_error(
-        fmt::format("the array's header: descr = '{}': expected float32 or float64", header.descr));
-  }
-  const cv::Size size = imageSizeOf(header);
-  const std::string_view data = bytes.substr(header.data_begin);
-  const std::size_t step = sizeOf(header.type);
-  if (data.size() != header.bytes()) {
-    throw std::runtime_error(
-        fmt::format("{} bytes follow the array's header: expected {} for {}x{} float{}",
-                    data.size(), header.bytes(), size.width, size.height, 8 * step));
-  }
-  cv::Mat1f image(size);
-  const char* at = data.data();
-  for (float& value : image) {
-    value = static_cast<float>(numberAt(at, header.type, header.big_endian));
-    at += step;
-  }
-  return image;
-}
-
-namespace {
-
-int side(const WordLine& line, std::size_t word) {
-  const std::uint64_t pixels = line.count(word);
-  if (pixels < 1 || pixels > kMaxImageSide) {
-    line.refuse(fmt::format("{} pixels: expected from 1 to 65535", pixels));
-  }
-  return static_cast<int>(pixels);
-}
-
-double scaleOf(const WordLine& line) {
-  double scale = 0;
-  if (line.words.size() == 1) scale = parseFinite(line.words[0]).value_or(0);
-  if (scale == 0) {
-    line.refuse("expected one number, the scale, below 0 where the data are little endian");
-  }
-  return scale;
-}
-
-}  // namespace
-
-bool looksLikePfm(std::string_view bytes) {
-  return bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == 'f' || bytes[1] == 'F') &&
-         (bytes[2] == '\n' || bytes[2] == '\r' || bytes[2] == ' ');
-}
-
-cv::Mat1f parsePfm(std::string_view bytes) {
-  TextScanner cursor(bytes);
-  const WordLine kind = wordLine(cursor, "Pf");
-  if (kind.words.size() != 1 || kind.words[0] != "Pf") {
-    kind.refuse("expected Pf alone, a grey float map");
-  }
-  const WordLine sides = wordLine(cursor, "width and height");
-  if (sides.words.size() != 2) sides.refuse("expected width and height");
-  const int width = side(sides, 0);
-  const int height = side(sides, 1);
-  const bool big_endian = scaleOf(wordLine(cursor, "the scale")) > 0;
-
-  cv::Mat1f image(height, width);
-  const std::size_t expected = image.total() * sizeof(float);
-  if (cursor.left() != expected) {
-    cursor.refuse(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
-                              expected, width, height));
-  }
-  const char* at = cursor.take(expected).data();
-  for (float& value : image) {
-    value = static_cast<float>(numberAt(at, NumberType::kFloat32, big_endian));
-    at += sizeof(float);
-  }
-  cv::flip(image, image, 0);
-  return image;
 }
 
 }  // namespace efm

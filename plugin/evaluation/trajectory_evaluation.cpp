@@ -26,29 +26,8 @@ using Unit = RelativeSpacing::Unit;
 
 constexpr double kDegrees = 180 / kPi;
 
-std::string nameOf(TrajectoryAlignment alignment) {
-  switch (alignment) {
-    case TrajectoryAlignment::kSe3:
-      return "se3";
-    case TrajectoryAlignment::kOrigin:
-      return "origin";
-    case TrajectoryAlignment::kNone:
-      break;
-  }
-  return "none";
-}
-
-std::string nameOf(Unit unit) {
-  switch (unit) {
-    case Unit::kFrames:
-      return "frames";
-    case Unit::kMetres:
-      return "m";
-    case Unit::kSeconds:
-      break;
-  }
-  return "s";
-}
+constexpr NamedChoice<Unit> kSpacingUnits[] = {
+    {Unit::kFrames, "frames"}, {Unit::kMetres, "m"}, {Unit::kSeconds, "s"}};
 
 /// One frame as in evo, one second as in Sturm et al. 2012, and the fractions of the length of
 /// rpg_trajectory_evaluation.
@@ -89,7 +68,7 @@ Json asJson(const SampleStatistics& statistics, double factor) {
 
 Json asJson(const EvaluatedSpacing& relative) {
   Json json = {{"delta", relative.spacing.amount},
-               {"unit", nameOf(relative.spacing.unit)},
+               {"unit", nameIn(kSpacingUnits, relative.spacing.unit)},
                {"pairs", relative.translation_m.count}};
   if (relative.translation_m.count == 0) return json;
   json["translation_m"] = asJson(relative.translation_m, 1);
@@ -107,7 +86,8 @@ double durationOf(const TrajectoryEvaluation& evaluation) {
 
 /// What the alignment does, and the transform that it found.
 std::string alignmentText(const TrajectoryEvaluation& evaluation) {
-  const std::string name = "alignment  " + nameOf(evaluation.alignment) + ": ";
+  const std::string name =
+      "alignment  " + std::string(nameIn(kTrajectoryAlignments, evaluation.alignment)) + ": ";
   if (evaluation.alignment == TrajectoryAlignment::kNone) return name + "the poses as they are\n";
   const Rigid3& T_world_map = evaluation.T_world_map;
   const Eigen::Vector3d& p = T_world_map.translation;
@@ -180,9 +160,9 @@ std::string evaluationTable(const TrajectoryEvaluation& evaluation) {
   positions.add(rowOf("absolute", statisticsOf(evaluation.errors.translation_m), 1));
   rotations.add(rowOf("absolute", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
   for (const EvaluatedSpacing& relative : evaluation.relative) {
-    const std::string name =
-        fmt::format("over {:.{}f} {}", relative.spacing.amount,
-                    relative.spacing.unit == Unit::kFrames ? 0 : 3, nameOf(relative.spacing.unit));
+    const std::string name = fmt::format("over {:.{}f} {}", relative.spacing.amount,
+                                         relative.spacing.unit == Unit::kFrames ? 0 : 3,
+                                         nameIn(kSpacingUnits, relative.spacing.unit));
     positions.add(rowOf(name, relative.translation_m, 1));
     rotations.add(rowOf(name, relative.rotation_rad, kDegrees));
   }
@@ -203,7 +183,7 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
   json["duration_s"] = durationOf(evaluation);
   json["first_s"] = formatSeconds(evaluation.pairs.front().t_ns);
   json["last_s"] = formatSeconds(evaluation.pairs.back().t_ns);
-  json["alignment"] = nameOf(evaluation.alignment);
+  json["alignment"] = nameIn(kTrajectoryAlignments, evaluation.alignment);
   json["aligned_by"] = {{"translation_m", {p.x(), p.y(), p.z()}},
                         {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
   json["ate"] = {{"translation_m", asJson(statisticsOf(evaluation.errors.translation_m), 1)},

@@ -9,9 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "maps/metrics/trajectory_metrics.h"
 
 namespace efm {
+
+/// The names on the command line and in the JSON.
+inline constexpr NamedChoice<TrajectoryAlignment> kTrajectoryAlignments[] = {
+    {TrajectoryAlignment::kSe3, "se3"},
+    {TrajectoryAlignment::kOrigin, "origin"},
+    {TrajectoryAlignment::kNone, "none"}};
 
 struct TrajectoryEvaluationOptions {
   /// Maximum time between the two poses of a pair, from 0. Default: 0.01 s, as in evo.

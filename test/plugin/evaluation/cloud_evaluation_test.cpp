@@ -7,7 +7,6 @@
 #include <random>
 
 #include "maps/io/point_cloud_file.h"
-#include "plugin/evaluation/cloud_alignment.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
