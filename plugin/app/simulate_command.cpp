@@ -18,7 +18,6 @@
 #include "plugin/app/progress.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "tracking_stub/presets/presets.h"
-#include "tracking_stub/presets/trajectory_simulation.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 #include "tracking_stub/truth/dataset_writer.h"
 

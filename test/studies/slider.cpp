@@ -119,7 +119,7 @@ void scoreTable(const std::vector<SliderResult>& results, const SliderTruth& tru
 
 /// The plane sweep over frames of the simulated slider, whose depth is known.
 void frameTruthOnItsOwn(const FrameDepthOptions& options, StudySection& section) {
-  const Simulation simulation = makeSlider(3);
+  const Simulation simulation = makeSimulation({"slider", {}, 3});
   const CameraModel& camera = simulation.rig.cameras[0].model;
   constexpr std::int64_t kPeriodNs = 38'765'000;
   std::vector<StampedPose> poses;

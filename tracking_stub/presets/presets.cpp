@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/presets/presets.h"
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <string_view>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/furnishing.h"
 #include "tracking_stub/scenes/scenes.h"
@@ -13,6 +15,28 @@ namespace efm {
 namespace {
 
 using Eigen::Vector3d;
+
+/// The start of every preset.
+constexpr std::int64_t kPresetStartNs = kNanosecondsPerSecond;
+
+/// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
+/// is up.
+Eigen::Quaterniond lookingAlongY() {
+  Eigen::Matrix3d R_world_cam;
+  R_world_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return Eigen::Quaterniond(R_world_cam);
+}
+
+/// A preset without scene, rig and motion.
+/// @param threshold contrast threshold of both polarities.
+Simulation emptyPreset(double duration_s, double threshold, std::uint64_t seed) {
+  Simulation simulation;
+  simulation.start_ns = kPresetStartNs;
+  simulation.duration_ns = durationFromSeconds(duration_s);
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = threshold;
+  simulation.seed = seed;
+  return simulation;
+}
 
 void addDeskRoom(Scene& scene, Painting& painting) {
   const Vector3d x = Vector3d::UnitX();
@@ -69,8 +93,8 @@ std::shared_ptr<const Motion> deskMotion() {
   return std::make_shared<SmoothMotion>(options);
 }
 
-}  // namespace
-
+/// A hand-held stereo pair looks over a cluttered desk into a room. World: x right, y into the
+/// room, z up, the desk's top at z = 0. About a million events per camera.
 Simulation makeDeskStereo(std::uint64_t seed) {
   constexpr double kFocalPx = 226;
   Simulation simulation = emptyPreset(2, 0.21, seed);
@@ -83,6 +107,8 @@ Simulation makeDeskStereo(std::uint64_t seed) {
   return simulation;
 }
 
+/// A stereo pair on a car's roof, 1.9 m above the road, drives down a street at 8 m/s. World: y
+/// along the street, z up, the road at z = 0. Some pixels see the sky.
 Simulation makeDriveStereo(std::uint64_t seed) {
   constexpr double kBaselineM = 0.60;
   constexpr double kSpeed = 8;  // m/s
@@ -121,6 +147,8 @@ Simulation makeDriveStereo(std::uint64_t seed) {
   return simulation;
 }
 
+/// A stereo pair of high resolution in a furnished room. World: z up. About 2.8 million events per
+/// camera.
 Simulation makeHdStereo(std::uint64_t seed) {
   RoomOptions room;
   room.size_m = {4.8, 4.2, 2.6};
@@ -152,6 +180,8 @@ Simulation makeHdStereo(std::uint64_t seed) {
   return simulation;
 }
 
+/// The cameras of desk_stereo before thin poles, 3 to 6 pixels wide, and a wall behind them. World:
+/// y forward, z up, the origin at the cameras.
 Simulation makePolesStereo(std::uint64_t seed) {
   PolesOptions poles;
   poles.nearest_m = 1.05;
@@ -177,6 +207,8 @@ Simulation makePolesStereo(std::uint64_t seed) {
   return simulation;
 }
 
+/// The cameras of desk_stereo go once around in a furnished room and look outwards; the last pose
+/// is the first pose. World: origin in the middle of the floor, z up.
 Simulation makeRoomStereo(std::uint64_t seed) {
   constexpr double kDurationS = 8;
   RoomOptions room;
@@ -215,8 +247,6 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   return simulation;
 }
 
-namespace {
-
 /// A board or box before the camera, its front rotated to the right by `right_deg`.
 void addBoard(Scene& scene, const Vector3d& center, const Vector3d& size_m, double right_deg,
               const Scene::Painter& paint) {
@@ -245,8 +275,9 @@ Scene sliderScene(std::uint64_t seed, double focal_px) {
   return scene;
 }
 
-}  // namespace
-
+/// One camera on a linear slider passes boards and boxes, like `slider_depth` of the Event Camera
+/// Dataset (Mueggler et al., IJRR 2017). It does not rotate, so edges along the motion fire no
+/// events and have no depth. World: the camera's frame in the middle of the path.
 Simulation makeSlider(std::uint64_t seed) {
   constexpr double kFocalPx = 335;
   constexpr double kSpeed = 0.32;  // m/s
@@ -267,8 +298,6 @@ Simulation makeSlider(std::uint64_t seed) {
   simulation.motion = std::make_shared<SmoothMotion>(motion);
   return simulation;
 }
-
-namespace {
 
 CameraModel makeFisheye(double focal_px, const std::vector<double>& coefficients) {
   CameraModel model = makePinhole(640, 480, focal_px);
@@ -311,8 +340,10 @@ std::shared_ptr<const Motion> trinocularMotion() {
   return std::make_shared<SmoothMotion>(options);
 }
 
-}  // namespace
-
+/// Three cameras, each with its own calibration, look into a corner of a furnished room. Camera 1
+/// is 0.16 m to the right and looks slightly inwards. Camera 2 is 0.14 m above the middle of the
+/// other two, tilted down, and rotated by 90 degrees about its axis. All see the middle of camera
+/// 0's view. World: z up.
 Simulation makeTrinocular(std::uint64_t seed) {
   RoomOptions room;
   room.size_m = {4.6, 4.4, 2.6};
@@ -326,8 +357,6 @@ Simulation makeTrinocular(std::uint64_t seed) {
   simulation.motion = trinocularMotion();
   return simulation;
 }
-
-namespace {
 
 using MakePreset = Simulation (*)(std::uint64_t seed);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
-
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,25 +8,12 @@
 
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/rigid3.h"
-#include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/trajectory.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {
 
-/// Parts of presets: rigs and motions.
-
-/// The start of every preset.
-inline constexpr std::int64_t kPresetStartNs = kNanosecondsPerSecond;
-
 inline double radians(double deg) { return deg * kPi / 180; }
-
-/// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
-/// is up.
-inline Eigen::Quaterniond lookingAlongY() {
-  Eigen::Matrix3d R_world_cam;
-  R_world_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  return Eigen::Quaterniond(R_world_cam);
-}
 
 /// No distortion, the principal point in the middle.
 inline CameraModel makePinhole(int width, int height, double focal_px) {
@@ -51,50 +36,8 @@ inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   return rig;
 }
 
-/// A preset without scene, rig and motion.
-/// @param threshold contrast threshold of both polarities.
-inline Simulation emptyPreset(double duration_s, double threshold, std::uint64_t seed) {
-  Simulation simulation;
-  simulation.start_ns = kPresetStartNs;
-  simulation.duration_ns = durationFromSeconds(duration_s);
-  simulation.pixels.threshold_on = simulation.pixels.threshold_off = threshold;
-  simulation.seed = seed;
-  return simulation;
-}
-
 /// The presets: simulations that are ready to run. Each starts at t = 1 s. README.md has a table of
 /// their cameras, durations and depths.
-
-/// A hand-held stereo pair looks over a cluttered desk into a room. World: x right, y into the
-/// room, z up, the desk's top at z = 0. About a million events per camera.
-Simulation makeDeskStereo(std::uint64_t seed);
-
-/// A stereo pair on a car's roof, 1.9 m above the road, drives down a street at 8 m/s. World: y
-/// along the street, z up, the road at z = 0. Some pixels see the sky.
-Simulation makeDriveStereo(std::uint64_t seed);
-
-/// A stereo pair of high resolution in a furnished room. World: z up. About 2.8 million events per
-/// camera.
-Simulation makeHdStereo(std::uint64_t seed);
-
-/// The cameras of desk_stereo before thin poles, 3 to 6 pixels wide, and a wall behind them. World:
-/// y forward, z up, the origin at the cameras.
-Simulation makePolesStereo(std::uint64_t seed);
-
-/// The cameras of desk_stereo go once around in a furnished room and look outwards; the last pose
-/// is the first pose. World: origin in the middle of the floor, z up.
-Simulation makeRoomStereo(std::uint64_t seed);
-
-/// One camera on a linear slider passes boards and boxes, like `slider_depth` of the Event Camera
-/// Dataset (Mueggler et al., IJRR 2017). It does not rotate, so edges along the motion fire no
-/// events and have no depth. World: the camera's frame in the middle of the path.
-Simulation makeSlider(std::uint64_t seed);
-
-/// Three cameras, each with its own calibration, look into a corner of a furnished room. Camera 1
-/// is 0.16 m to the right and looks slightly inwards. Camera 2 is 0.14 m above the middle of the
-/// other two, tilted down, and rotated by 90 degrees about its axis. All see the middle of camera
-/// 0's view. World: z up.
-Simulation makeTrinocular(std::uint64_t seed);
 
 struct SimulationOptions {
   std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
@@ -110,5 +53,30 @@ std::vector<std::string> simulationPresets();
 
 /// Scene, rig and motion of a preset.
 Simulation makeSimulation(const SimulationOptions& options = {});
+
+struct TrajectorySimulationOptions {
+  /// One of `simulationScenes`:
+  ///   room    a furnished room; its walls are at least 1.9 m from the path;
+  ///   street  a street along the path, for vehicles: see makeStreet;
+  ///   poles   thin poles before a wall, in the mean viewing direction.
+  std::string scene = "room";
+  /// Start time in the trajectory's clock. Default: `startOfMotion`.
+  std::optional<std::int64_t> start_ns;
+  /// Seconds, 0.001 to 600. Default: 5, or less where the trajectory ends earlier.
+  std::optional<double> duration_s;
+  std::uint64_t seed = 1;
+
+  void validate() const;
+};
+
+/// The names of the scenes that can be built around a trajectory.
+std::vector<std::string> simulationScenes();
+
+/// Moves a rig along a measured trajectory. The trajectory is smoothed (see `smoothTrajectory`),
+/// and the smoothed trajectory is the truth. The scene is built around the simulated part of the
+/// path. Its vertical is the mean y axis of the cameras.
+/// @param poses T_world_cam0, where camera 0 is the rig's frame.
+Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
+                                    const std::vector<StampedPose>& poses, const Rig& rig);
 
 }  // namespace efm

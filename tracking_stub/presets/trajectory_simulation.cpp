@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/presets/trajectory_simulation.h"
+#include "tracking_stub/presets/presets.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -32,91 +32,6 @@ int cellOf(double position_m, double length_m, int cells) {
   return std::clamp(static_cast<int>(position_m / length_m * cells), 0, cells - 1);
 }
 
-}  // namespace
-
-SurfaceCells::SurfaceCells(const Scene& scene, double cell_m) : scene_(&scene) {
-  requireOption(cell_m > 0, "cell_m", cell_m, "above 0");
-  for (int surface = 0; surface < scene.size(); ++surface) {
-    const Rectangle& r = scene.rectangle(surface);
-    Grid grid;
-    grid.columns = cellsAlong(r.width_m, cell_m);
-    grid.rows = cellsAlong(r.height_m, cell_m);
-    grid.counts.resize(static_cast<std::size_t>(grid.columns) *
-                       static_cast<std::size_t>(grid.rows));
-    grids_.push_back(std::move(grid));
-  }
-}
-
-void SurfaceCells::add(const SurfacePoint& point) {
-  if (point.surface < 0) return;
-  const Rectangle& r = scene_->rectangle(point.surface);
-  Grid& grid = grids_[static_cast<std::size_t>(point.surface)];
-  const int column = cellOf(point.u_m, r.width_m, grid.columns);
-  const int row = cellOf(point.v_m, r.height_m, grid.rows);
-  ++grid.counts[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns) +
-                static_cast<std::size_t>(column)];
-}
-
-std::vector<Eigen::Vector3f> SurfaceCells::centers(std::uint32_t min_count) const {
-  std::vector<Eigen::Vector3f> centers;
-  for (int surface = 0; surface < scene_->size(); ++surface) {
-    const Rectangle& r = scene_->rectangle(surface);
-    const Grid& grid = grids_[static_cast<std::size_t>(surface)];
-    auto count = grid.counts.begin();
-    for (int row = 0; row < grid.rows; ++row) {
-      for (int column = 0; column < grid.columns; ++column) {
-        if (*count++ < min_count) continue;
-        const Eigen::Vector3d center = r.pointAt((column + 0.5) * r.width_m / grid.columns,
-                                                 (row + 0.5) * r.height_m / grid.rows);
-        centers.push_back(center.cast<float>());
-      }
-    }
-  }
-  return centers;
-}
-
-namespace {
-
-constexpr std::uint32_t kMinEvents = 3;
-/// The rays of one view miss some cells. The views of the moving camera together see them.
-constexpr std::int64_t kViewPeriodNs = 20'000'000;
-
-void addVisibleCells(const Scene& scene, const PixelRays& rays, const Rigid3& T_world_cam,
-                     SurfaceCells& seen) {
-  const SceneView view(scene, T_world_cam, rays.bounds());
-  for (int y = 0; y < rays.height(); ++y) {
-    for (int x = 0; x < rays.width(); ++x) {
-      const Eigen::Vector2d& ray = rays(x, y).ray;
-      seen.add(view.surfacePointOf(view.cast(ray), ray));
-    }
-  }
-}
-
-}  // namespace
-
-TruthClouds makeTruthClouds(const Simulation& simulation,
-                            const std::vector<CameraRecording>& recordings) {
-  SurfaceCells seen(simulation.scene, simulation.truth_cell_m);
-  SurfaceCells fired(simulation.scene, simulation.truth_cell_m);
-  for (const RigCamera& camera : simulation.rig.cameras) {
-    const PixelRays rays(camera.model);
-    for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();
-         t_ns += kViewPeriodNs) {
-      addVisibleCells(simulation.scene, rays, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
-                      seen);
-    }
-  }
-  for (const CameraRecording& recording : recordings) {
-    for (const SurfacePoint& source : recording.sources) {
-      seen.add(source);
-      fired.add(source);
-    }
-  }
-  return {seen.centers(1), fired.centers(kMinEvents)};
-}
-
-namespace {
-
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kDepthPeriodNs = 50'000'000;
@@ -171,6 +86,46 @@ void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
   text << "  - [0, 0, 0, 1]\n";
 }
 
+constexpr std::uint32_t kMinEvents = 3;
+/// The rays of one view miss some cells. The views of the moving camera together see them.
+constexpr std::int64_t kViewPeriodNs = 20'000'000;
+
+void addVisibleCells(const Scene& scene, const PixelRays& rays, const Rigid3& T_world_cam,
+                     SurfaceCells& seen) {
+  const SceneView view(scene, T_world_cam, rays.bounds());
+  for (int y = 0; y < rays.height(); ++y) {
+    for (int x = 0; x < rays.width(); ++x) {
+      const Eigen::Vector2d& ray = rays(x, y).ray;
+      seen.add(view.surfacePointOf(view.cast(ray), ray));
+    }
+  }
+}
+
+/// Writes the truth for maps: a point per cell of about `Simulation::truth_cell_m` on the true
+/// surfaces, frame `world`. gt_cloud.ply has all cells that a pixel saw; gt_edges.ply those with at
+/// least 3 events, which a semi-dense map should contain.
+void writeTruthClouds(const fs::path& folder, const Simulation& simulation,
+                      const std::vector<CameraRecording>& recordings) {
+  SurfaceCells seen(simulation.scene, simulation.truth_cell_m);
+  SurfaceCells fired(simulation.scene, simulation.truth_cell_m);
+  for (const RigCamera& camera : simulation.rig.cameras) {
+    const PixelRays rays(camera.model);
+    for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();
+         t_ns += kViewPeriodNs) {
+      addVisibleCells(simulation.scene, rays, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
+                      seen);
+    }
+  }
+  for (const CameraRecording& recording : recordings) {
+    for (const SurfacePoint& source : recording.sources) {
+      seen.add(source);
+      fired.add(source);
+    }
+  }
+  writePly(folder / "gt_cloud.ply", seen.centers(1));
+  writePly(folder / "gt_edges.ply", fired.centers(kMinEvents));
+}
+
 void writeDepthMaps(const fs::path& depth_folder, const Simulation& simulation,
                     const std::function<void()>& before_file) {
   makeFolder(depth_folder);
@@ -189,6 +144,47 @@ void writeDepthMaps(const fs::path& depth_folder, const Simulation& simulation,
 }
 
 }  // namespace
+
+SurfaceCells::SurfaceCells(const Scene& scene, double cell_m) : scene_(&scene) {
+  requireOption(cell_m > 0, "cell_m", cell_m, "above 0");
+  for (int surface = 0; surface < scene.size(); ++surface) {
+    const Rectangle& r = scene.rectangle(surface);
+    Grid grid;
+    grid.columns = cellsAlong(r.width_m, cell_m);
+    grid.rows = cellsAlong(r.height_m, cell_m);
+    grid.counts.resize(static_cast<std::size_t>(grid.columns) *
+                       static_cast<std::size_t>(grid.rows));
+    grids_.push_back(std::move(grid));
+  }
+}
+
+void SurfaceCells::add(const SurfacePoint& point) {
+  if (point.surface < 0) return;
+  const Rectangle& r = scene_->rectangle(point.surface);
+  Grid& grid = grids_[static_cast<std::size_t>(point.surface)];
+  const int column = cellOf(point.u_m, r.width_m, grid.columns);
+  const int row = cellOf(point.v_m, r.height_m, grid.rows);
+  ++grid.counts[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns) +
+                static_cast<std::size_t>(column)];
+}
+
+std::vector<Eigen::Vector3f> SurfaceCells::centers(std::uint32_t min_count) const {
+  std::vector<Eigen::Vector3f> centers;
+  for (int surface = 0; surface < scene_->size(); ++surface) {
+    const Rectangle& r = scene_->rectangle(surface);
+    const Grid& grid = grids_[static_cast<std::size_t>(surface)];
+    auto count = grid.counts.begin();
+    for (int row = 0; row < grid.rows; ++row) {
+      for (int column = 0; column < grid.columns; ++column) {
+        if (*count++ < min_count) continue;
+        const Eigen::Vector3d center = r.pointAt((column + 0.5) * r.width_m / grid.columns,
+                                                 (row + 0.5) * r.height_m / grid.rows);
+        centers.push_back(center.cast<float>());
+      }
+    }
+  }
+  return centers;
+}
 
 void writeDataset(const fs::path& folder, const Simulation& simulation,
                   const std::vector<CameraRecording>& recordings,
@@ -211,9 +207,7 @@ void writeDataset(const fs::path& folder, const Simulation& simulation,
   writeTumTrajectory(folder / "poses.txt", samplePoses(simulation));
   writeDepthMaps(folder / "depth", simulation, before_file);
   before_file();
-  const TruthClouds truth = makeTruthClouds(simulation, recordings);
-  writePly(folder / "gt_cloud.ply", truth.surfaces);
-  writePly(folder / "gt_edges.ply", truth.edges);
+  writeTruthClouds(folder, simulation, recordings);
   before_file();
 }
 

@@ -40,18 +40,6 @@ class SurfaceCells {
   std::vector<Grid> grids_;  // per surface
 };
 
-/// The truth for maps of a simulated recording: a point per cell of about
-/// `Simulation::truth_cell_m` on the true surfaces, frame `world`.
-struct TruthClouds {
-  std::vector<Eigen::Vector3f> surfaces;  ///< All cells that a pixel saw.
-  /// The cells with at least 3 events: a semi-dense map should contain them.
-  std::vector<Eigen::Vector3f> edges;
-};
-
-/// @param recordings of this simulation, one per camera.
-TruthClouds makeTruthClouds(const Simulation& simulation,
-                            const std::vector<CameraRecording>& recordings);
-
 /// Writes a simulated recording as a dataset:
 ///   camN/events.txt        a line `t x y p` per event
 ///   camchain.yaml          calibration in Kalibr's format

@@ -15,7 +15,7 @@ constexpr double kFarM = 4.0;
 }  // namespace
 
 Simulation flyingRoom(double duration_s) {
-  Simulation simulation = makeHdStereo(1);
+  Simulation simulation = makeSimulation({"hd_stereo"});
   simulation.duration_ns = durationFromSeconds(duration_s);
   return withThreshold(withWidth(simulation, 640), 0.2);
 }

@@ -5,7 +5,7 @@
 
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
-#include "tracking_stub/presets/trajectory_simulation.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

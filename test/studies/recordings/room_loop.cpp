@@ -28,7 +28,7 @@ std::shared_ptr<const Motion> sway(std::int64_t start_ns) {
 }  // namespace
 
 Simulation roomLoop(double duration_s) {
-  Simulation simulation = makeRoomStereo(1);
+  Simulation simulation = makeSimulation({"room_stereo"});
   LoopMotionOptions loop;
   loop.start_ns = simulation.start_ns;
   loop.period_s = kPeriodS;

@@ -13,7 +13,6 @@
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/presets/presets.h"
-#include "tracking_stub/presets/trajectory_simulation.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
@@ -133,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(All, Presets,
                          [](const auto& preset) { return preset.param.preset; });
 
 TEST(DeskStereo, PosesInterpolateToFarBelowAHundredthOfAPixel) {
-  const Simulation desk = makeDeskStereo(1);
+  const Simulation desk = makeSimulation({"desk_stereo"});
   Trajectory trajectory;
   for (const StampedPose& pose : samplePoses(desk)) trajectory.add(pose);
   const Eigen::Vector3d p_cam(0.3, 0.2, 0.6);  // at the min depth
