@@ -100,13 +100,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   std::int64_t middle_ns = 0;
   efm::fuzz::readOrRefuse(kName, [&] {
-    efm::BagEvents events({{bag, 0}});
-    middle_ns = efm::fuzz::readStream(events);
+    middle_ns = efm::fuzz::readStream(*efm::openBagEvents({{{bag, 0}}}).front());
   });
   efm::fuzz::readOrRefuse(kName, [&] {
-    efm::BagEvents events({{bag, 0}});
-    events.seek(middle_ns);
-    efm::fuzz::readStream(events);
+    const auto cameras = efm::openBagEvents({{{bag, 0}}});
+    cameras.front()->seek(middle_ns);
+    efm::fuzz::readStream(*cameras.front());
   });
   return 0;
 }

@@ -328,13 +328,9 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
   RosTopics cameras = chosen(topics, options, hasEvents);
   cameras.erase(std::remove_if(cameras.begin(), cameras.end(), isTrigger), cameras.end());
   RecordingParts parts;
-  std::vector<BagEvents*> streams;
-  for (const RosTopic& camera : cameras) {
-    auto stream = std::make_unique<BagEvents>(camera.parts);
-    if (!streams.empty()) stream->shareClock(*streams.front());
-    streams.push_back(stream.get());
-    parts.cameras.push_back(std::move(stream));
-  }
+  std::vector<std::vector<BagTopicPart>> camera_parts;
+  for (const RosTopic& camera : cameras) camera_parts.push_back(camera.parts);
+  parts.cameras = openBagEvents(camera_parts);
   addPoses(chosen(topics, options, hasPoses), parts);
   addCalibration(topics, cameras, parts);
   return parts;

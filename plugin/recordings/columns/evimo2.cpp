@@ -91,7 +91,7 @@ std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOption
   if (t->isReal()) columns.time_exponent = 0;
   columns.inverted = isSamsung(folder);
   columns.size = sizeOfDepth(folder);
-  return std::make_unique<ArrayEvents>(std::move(columns), options);
+  return openArrayEvents(std::move(columns), options);
 }
 
 }  // namespace

@@ -39,46 +39,14 @@ const std::vector<Hdf5Layout>& hdf5Layouts();
 
 /// The events of a camera in an HDF5 file. Real times are rounded to what they resolve
 /// (`nanoseconds`). Reads chunk by chunk; `seek` reads the index and a few chunks.
-class Hdf5EventStream : public EventStream {
- public:
-  /// @param camera one of the layout's groups.
-  /// @param size of the sensor, if it is known.
-  /// @param options the unit of times that the layout does not know.
-  /// @throws std::runtime_error naming the file and the data set that is missing or wrong, or whose
-  /// unit of time is not certain.
-  Hdf5EventStream(std::shared_ptr<const Hdf5File> file, const Hdf5Layout& layout,
-                  const std::string& camera, std::optional<CameraSize> size,
-                  const ReaderOptions& options);
-
-  bool read(std::vector<Event>& events) override;
-  void seek(std::int64_t t_ns) override;
-  std::string positionOf(std::size_t index) const override;
-  std::string name() const override { return file_->path().string(); }
-  double progress() const override;
-  std::optional<CameraSize> size() const override { return size_; }
-  std::vector<Warning> warnings() const override { return warnings_; }
-
- private:
-  enum Column : std::size_t { kX, kY, kT, kP };
-
-  void openColumns(const Hdf5Layout& layout, const std::string& camera);
-  void findUnit(const ReaderOptions& options);
-  void append(std::vector<Event>& events);
-  std::int64_t timeAt(std::uint64_t index) const;
-  std::optional<std::uint64_t> indexed(std::int64_t t_ns) const;
-  std::string positionInFile(std::uint64_t index) const;
-
-  std::shared_ptr<const Hdf5File> file_;
-  std::string place_;  // of the events in the file, for errors
-  std::optional<CameraSize> size_;
-  std::int64_t unit_ns_;
-  std::int64_t offset_ns_ = 0;
-  std::vector<Hdf5Column> columns_;  // x, y, t, p
-  std::optional<Hdf5Column> index_;  // of milliseconds
-  std::vector<Warning> warnings_;
-  std::uint64_t count_ = 0;
-  std::uint64_t first_ = 0;  // event of the last block
-  std::uint64_t next_ = 0;
-};
+/// @param camera one of the layout's groups.
+/// @param size of the sensor, if it is known.
+/// @param options the unit of times that the layout does not know.
+/// @throws std::runtime_error naming the file and the data set that is missing or wrong, or whose
+/// unit of time is not certain.
+std::unique_ptr<EventStream> openHdf5Events(std::shared_ptr<const Hdf5File> file,
+                                            const Hdf5Layout& layout, const std::string& camera,
+                                            std::optional<CameraSize> size,
+                                            const ReaderOptions& options);
 
 }  // namespace efm

@@ -147,7 +147,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
       size = CameraSize{calibrated.model.width, calibrated.model.height};
       calibration.rig.cameras.push_back(calibrated);
     }
-    parts.cameras.push_back(std::make_unique<Hdf5EventStream>(file, layout, camera, size, options));
+    parts.cameras.push_back(openHdf5Events(file, layout, camera, size, options));
     ++count;
   }
   // Without the first camera, T_rig_cam of the others has another rig.

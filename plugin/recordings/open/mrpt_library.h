@@ -34,7 +34,7 @@ struct MrptLibrary {
                                                RawlogCompression compression);
   void (*writeSimpleMap)(const std::filesystem::path& file,
                          const std::vector<StoredKeyframe>& keyframes);
-  /// See MapFrames (plugin/mrpt/window/map_scene.h).
+  /// See `recordFrames` (plugin/mrpt/window/map_scene.h).
   std::unique_ptr<MapWatcher> (*recordFrames)(const std::filesystem::path& folder, bool force);
 };
 

@@ -5,16 +5,30 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <fstream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "mapping/base/text.h"
+#include "plugin/recordings/sensors/evt_decoder.h"
 
 namespace efm {
 namespace {
+
+/// What the lines "% key value" at the beginning of a RAW file say.
+struct RawHeader {
+  EvtEncoding encoding = EvtEncoding::kEvt3;  ///< "% evt 3.0" or "% format EVT3;…"
+  /// "% geometry 1280x720" or "% format …;height=720;…"; else of the camera that "% plugin_name" or
+  /// "% system_ID" names, as files of 2020 have it.
+  std::optional<CameraSize> size;
+  std::uint64_t bytes = 0;  ///< Of the header; the words follow.
+};
 
 constexpr std::size_t kRawBlockBytes = std::size_t{1} << 18U;  // whole words of every encoding
 constexpr std::size_t kMaxRawHeaderBytes = std::size_t{1} << 16U;
@@ -189,92 +203,113 @@ std::ifstream openRaw(const std::filesystem::path& file) {
   return stream;
 }
 
+/// The events of a RAW file of a Prophesee camera. Times are those of the sensor's clock, see
+/// EvtDecoder.
+class PropheseeRawStream : public EventStream {
+ public:
+  explicit PropheseeRawStream(std::filesystem::path file)
+      : file_(std::move(file)),
+        stream_(openRaw(file_)),
+        bytes_total_(std::filesystem::file_size(file_)),
+        header_(RawHeaderParser(file_, beginningOf(file_)).parse()),
+        decoder_(header_.encoding),
+        at_block_(decoder_),
+        block_byte_(header_.bytes) {
+    stream_.seekg(static_cast<std::streamoff>(header_.bytes));
+  }
+
+  bool read(std::vector<Event>& events) override {
+    events.clear();
+    at_block_ = decoder_;
+    if (readBlock()) {
+      decoder_.decode(block_.data(), block_.size(), events);
+      return true;
+    }
+    if (decoder_.incompleteBytes() > 0) {
+      throw std::runtime_error(
+          fmt::format("{}{} bytes of a word: expected all {}, but the file ends within it",
+                      place(block_byte_ - decoder_.incompleteBytes()), decoder_.incompleteBytes(),
+                      decoder_.wordBytes()));
+    }
+    if (!decoder_.hasTime() && decoder_.undatedEvents() > 0) {
+      throw std::runtime_error(
+          fmt::format("{}{} events without a time: expected words TIME_HIGH before them",
+                      place(block_byte_), decoder_.undatedEvents()));
+    }
+    return false;
+  }
+  /// Reads the file up to the time, but only its TIME_HIGH words (some GB/s): in EVT 3.0 no other
+  /// way tells how often the clock wrapped.
+  void seek(std::int64_t t_ns) override {
+    // `scan` reaches the time in the current block. Decoding starts a block earlier: what an event
+    // needs beside the TIME_HIGH words, its row for instance, comes from there.
+    EvtDecoder scan(header_.encoding);
+    EvtDecoder at_last = scan;
+    std::uint64_t last_byte = header_.bytes;
+    std::uint64_t start_byte = header_.bytes;
+    while (readBlock()) {
+      decoder_ = std::exchange(at_last, scan);
+      start_byte = std::exchange(last_byte, block_byte_);
+      scan.scanTime(block_.data(), block_.size());
+      if (scan.timeHighNs() + kMaxAheadNs >= t_ns) break;
+    }
+    from_beginning_ = false;
+    stream_.clear();
+    stream_.seekg(static_cast<std::streamoff>(start_byte));
+    block_.clear();
+    block_byte_ = start_byte;
+  }
+  std::string positionOf(std::size_t index) const override {
+    EvtDecoder decoder = at_block_;
+    std::vector<Event> events;
+    std::size_t at = 0;
+    while (at < block_.size()) {
+      const std::size_t word = std::min(decoder.wordBytes(), block_.size() - at);
+      decoder.decode(block_.data() + at, word, events);
+      if (events.size() > index) break;
+      at += word;
+    }
+    return fmt::format("{}: byte {}", file_.string(), block_byte_ + at);
+  }
+  std::string name() const override { return file_.string(); }
+  double progress() const override {
+    if (bytes_total_ == 0) return 0;
+    return static_cast<double>(block_byte_ + block_.size()) / static_cast<double>(bytes_total_);
+  }
+  std::optional<CameraSize> size() const override { return header_.size; }
+  /// The file has no gaps: only events at its beginning have no time.
+  std::uint64_t undatedEvents() const override {
+    return from_beginning_ ? decoder_.undatedEvents() : 0;
+  }
+
+ private:
+  /// Reads the block behind the current one. @return false at the end.
+  bool readBlock() {
+    block_byte_ += block_.size();
+    block_.resize(std::min<std::uint64_t>(kRawBlockBytes,
+                                          bytes_total_ - std::min(block_byte_, bytes_total_)));
+    stream_.read(reinterpret_cast<char*>(block_.data()),
+                 static_cast<std::streamsize>(block_.size()));
+    block_.resize(static_cast<std::size_t>(stream_.gcount()));
+    if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
+    return !block_.empty();
+  }
+  std::string place(std::uint64_t byte) const {
+    return fmt::format("{}: byte {}: ", file_.string(), byte);
+  }
+
+  std::filesystem::path file_;
+  std::ifstream stream_;
+  std::uint64_t bytes_total_ = 0;
+  RawHeader header_;
+  EvtDecoder decoder_;
+  bool from_beginning_ = true;
+  EvtDecoder at_block_;  // the decoder before the block
+  std::vector<std::uint8_t> block_;
+  std::uint64_t block_byte_ = 0;  // the position of the block in the file
+};
+
 }  // namespace
-
-PropheseeRawStream::PropheseeRawStream(std::filesystem::path file)
-    : file_(std::move(file)),
-      stream_(openRaw(file_)),
-      bytes_total_(std::filesystem::file_size(file_)),
-      header_(RawHeaderParser(file_, beginningOf(file_)).parse()),
-      decoder_(header_.encoding),
-      at_block_(decoder_),
-      block_byte_(header_.bytes) {
-  stream_.seekg(static_cast<std::streamoff>(header_.bytes));
-}
-
-/// Reads the block behind the current one. @return false at the end.
-bool PropheseeRawStream::readBlock() {
-  block_byte_ += block_.size();
-  block_.resize(
-      std::min<std::uint64_t>(kRawBlockBytes, bytes_total_ - std::min(block_byte_, bytes_total_)));
-  stream_.read(reinterpret_cast<char*>(block_.data()), static_cast<std::streamsize>(block_.size()));
-  block_.resize(static_cast<std::size_t>(stream_.gcount()));
-  if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
-  return !block_.empty();
-}
-
-bool PropheseeRawStream::read(std::vector<Event>& events) {
-  events.clear();
-  at_block_ = decoder_;
-  if (readBlock()) {
-    decoder_.decode(block_.data(), block_.size(), events);
-    return true;
-  }
-  if (decoder_.incompleteBytes() > 0) {
-    throw std::runtime_error(
-        fmt::format("{}{} bytes of a word: expected all {}, but the file ends within it",
-                    place(block_byte_ - decoder_.incompleteBytes()), decoder_.incompleteBytes(),
-                    decoder_.wordBytes()));
-  }
-  if (!decoder_.hasTime() && decoder_.undatedEvents() > 0) {
-    throw std::runtime_error(
-        fmt::format("{}{} events without a time: expected words TIME_HIGH before them",
-                    place(block_byte_), decoder_.undatedEvents()));
-  }
-  return false;
-}
-
-void PropheseeRawStream::seek(std::int64_t t_ns) {
-  // `scan` reaches the time in the current block. Decoding starts a block earlier: what an event
-  // needs beside the TIME_HIGH words, its row for instance, comes from there.
-  EvtDecoder scan(header_.encoding);
-  EvtDecoder at_last = scan;
-  std::uint64_t last_byte = header_.bytes;
-  std::uint64_t start_byte = header_.bytes;
-  while (readBlock()) {
-    decoder_ = std::exchange(at_last, scan);
-    start_byte = std::exchange(last_byte, block_byte_);
-    scan.scanTime(block_.data(), block_.size());
-    if (scan.timeHighNs() + kMaxAheadNs >= t_ns) break;
-  }
-  from_beginning_ = false;
-  stream_.clear();
-  stream_.seekg(static_cast<std::streamoff>(start_byte));
-  block_.clear();
-  block_byte_ = start_byte;
-}
-
-std::string PropheseeRawStream::positionOf(std::size_t index) const {
-  EvtDecoder decoder = at_block_;
-  std::vector<Event> events;
-  std::size_t at = 0;
-  while (at < block_.size()) {
-    const std::size_t word = std::min(decoder.wordBytes(), block_.size() - at);
-    decoder.decode(block_.data() + at, word, events);
-    if (events.size() > index) break;
-    at += word;
-  }
-  return fmt::format("{}: byte {}", file_.string(), block_byte_ + at);
-}
-
-double PropheseeRawStream::progress() const {
-  if (bytes_total_ == 0) return 0;
-  return static_cast<double>(block_byte_ + block_.size()) / static_cast<double>(bytes_total_);
-}
-
-std::string PropheseeRawStream::place(std::uint64_t byte) const {
-  return fmt::format("{}: byte {}: ", file_.string(), byte);
-}
 
 bool looksLikePropheseeRaw(const std::filesystem::path& file) {
   if (!isFile(file)) return false;

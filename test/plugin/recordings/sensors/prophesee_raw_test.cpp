@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <memory>
 #include <random>
+#include <utility>
 
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/paths.h"
@@ -52,6 +54,10 @@ std::vector<Event> longRecording() {
   return events;
 }
 
+std::unique_ptr<EventStream> streamOf(const std::filesystem::path& file) {
+  return std::move(openPropheseeRaw({file}, {}).cameras.front());
+}
+
 class PropheseeRaw : public TemporaryFolder {
  protected:
   std::filesystem::path file() const { return folder() / "recording.raw"; }
@@ -76,7 +82,7 @@ TEST_F(PropheseeRaw, WithoutGeometryTheSizeIsThatOfTheCamera) {
            {"% plugin_name hal_plugin_gen42\n% serial_number 21\n", 0, 0},
            {"% system_ID 48\n% geometry 320x240\n% plugin_name hal_plugin_gen3_fx3\n", 320, 240}}) {
     writeFile(file(), "% Date 2020-09-25 07:48:31\n" + each.lines + "% evt 2.0\n");
-    const std::optional<CameraSize> size = PropheseeRawStream(file()).size();
+    const std::optional<CameraSize> size = streamOf(file())->size();
     EXPECT_EQ(size.has_value(), each.width > 0) << each.lines;
     EXPECT_EQ(size.value_or(CameraSize{}).width, each.width) << each.lines;
     EXPECT_EQ(size.value_or(CameraSize{}).height, each.height) << each.lines;
@@ -94,13 +100,13 @@ TEST_F(PropheseeRaw, EachEncodingIsFoundByItsHeaderAndASeekLeavesOutMostBeforeIt
     for (const std::int64_t t_ns :
          {std::int64_t{-1}, std::int64_t{0}, std::int64_t{20'000'000'000},
           std::int64_t{33'554'432'000}, events.back().t_ns, std::int64_t{900'000'000'000}}) {
-      PropheseeRawStream stream(file());
-      ASSERT_TRUE(stream.size()) << kind.header;
-      EXPECT_EQ(stream.size()->width, 640);
-      EXPECT_EQ(stream.size()->height, 480);
-      stream.seek(t_ns);
-      const std::vector<Event> read = readStream(stream);
-      EXPECT_EQ(stream.progress(), 1);
+      const auto stream = streamOf(file());
+      ASSERT_TRUE(stream->size()) << kind.header;
+      EXPECT_EQ(stream->size()->width, 640);
+      EXPECT_EQ(stream->size()->height, 480);
+      stream->seek(t_ns);
+      const std::vector<Event> read = readStream(*stream);
+      EXPECT_EQ(stream->progress(), 1);
       const auto from = [&](const std::vector<Event>& all) {
         return std::vector<Event>(
             std::find_if(all.begin(), all.end(), [&](const Event& e) { return e.t_ns >= t_ns; }),
@@ -117,34 +123,34 @@ TEST_F(PropheseeRaw, EachEncodingIsFoundByItsHeaderAndASeekLeavesOutMostBeforeIt
 TEST_F(PropheseeRaw, EventsBeforeTheFirstTimeAreCountedUnlessTheyLieBeforeTheSoughtTime) {
   writeFile(file(), "% evt 3.0\n" + evt3Words({0x0001, 0x2002, 0x2003, 0x8001, 0x6000, 0x2004}) +
                         evtBytes(EvtEncoding::kEvt3, longRecording()));
-  PropheseeRawStream whole(file());
-  EXPECT_EQ(readStream(whole).front().x, 4);
-  EXPECT_EQ(whole.undatedEvents(), 2U);
-  PropheseeRawStream end(file());
-  end.seek(20'000'000'000);
-  readStream(end);
-  EXPECT_EQ(end.undatedEvents(), 0U);
+  const auto whole = streamOf(file());
+  EXPECT_EQ(readStream(*whole).front().x, 4);
+  EXPECT_EQ(whole->undatedEvents(), 2U);
+  const auto end = streamOf(file());
+  end->seek(20'000'000'000);
+  readStream(*end);
+  EXPECT_EQ(end->undatedEvents(), 0U);
 }
 
 TEST_F(PropheseeRaw, ThePositionOfAnEventIsThatOfItsWord) {
   const std::string header = "% evt 3.0\n";
   // The fourth word has one event, the sixth two.
   writeFile(file(), header + evt3Words({0x8001, 0x6000, 0x0005, 0x2001, 0x3000, 0x4003}));
-  PropheseeRawStream stream(file());
+  const auto stream = streamOf(file());
   std::vector<Event> events;
-  ASSERT_TRUE(stream.read(events));
+  ASSERT_TRUE(stream->read(events));
   ASSERT_EQ(events.size(), 3U);
-  EXPECT_EQ(stream.positionOf(0), file().string() + ": byte 16");
-  EXPECT_EQ(stream.positionOf(1), file().string() + ": byte 20");
-  EXPECT_EQ(stream.positionOf(2), file().string() + ": byte 20");
+  EXPECT_EQ(stream->positionOf(0), file().string() + ": byte 16");
+  EXPECT_EQ(stream->positionOf(1), file().string() + ": byte 20");
+  EXPECT_EQ(stream->positionOf(2), file().string() + ": byte 20");
 }
 
 TEST_F(PropheseeRaw, WordsThatBeginLikeALineAreNoHeader) {
   std::string words;  // a TIME_HIGH and an event: "% \1\x80\n\0\0\0"
   for (const std::uint32_t word : {0x8001'2025U, 0x0000'000aU}) putWord(words, word);
   writeFile(file(), "% evt 2.0\n" + words);
-  PropheseeRawStream stream(file());
-  const std::vector<Event> events = readStream(stream);
+  const auto stream = streamOf(file());
+  const std::vector<Event> events = readStream(*stream);
   ASSERT_EQ(events.size(), 1U);
   EXPECT_TRUE((events[0] == Event{0x1'2025 * 64'000LL, 0, 10, false}));
 }
@@ -165,21 +171,21 @@ TEST_F(PropheseeRaw, AWrongHeaderIsAnErrorThatNamesItsLine) {
       {"", {": no encoding"}}};
   for (const Case& wrong : cases) {
     writeFile(file(), wrong.header);
-    const std::string error = errorOf([&] { PropheseeRawStream stream(file()); });
+    const std::string error = errorOf([&] { streamOf(file()); });
     EXPECT_THAT(error, StartsWith(file().string()));
     for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
-  EXPECT_THAT(errorOf([&] { PropheseeRawStream stream(folder()); }), HasSubstr("cannot be opened"));
+  EXPECT_THAT(errorOf([&] { streamOf(folder()); }), HasSubstr("cannot be opened"));
 }
 
 TEST_F(PropheseeRaw, AnEndWithinAWordAndEventsWithoutTimeAreErrors) {
   writeFile(file(), "% evt 2.0\n" + std::string("\0\0\0\x80\1\2\3", 7));
-  PropheseeRawStream cut(file());
-  EXPECT_THAT(errorOf([&] { readStream(cut); }),
+  const auto cut = streamOf(file());
+  EXPECT_THAT(errorOf([&] { readStream(*cut); }),
               AllOf(HasSubstr("byte 14: 3 bytes of a word"), HasSubstr("all 4")));
   writeFile(file(), "% evt 3.0\n" + evt3Words({0x0001, 0x2002, 0x2003}));
-  PropheseeRawStream undated(file());
-  EXPECT_THAT(errorOf([&] { readStream(undated); }),
+  const auto undated = streamOf(file());
+  EXPECT_THAT(errorOf([&] { readStream(*undated); }),
               AllOf(HasSubstr("2 events without a time"), HasSubstr("TIME_HIGH")));
 }
 
@@ -205,9 +211,9 @@ TEST_F(PropheseeRaw, ARealEvt2RecordingHasTheEventsThatNumPyFinds) {
   const std::filesystem::path real =
       std::filesystem::path(EFM_SHARED_DATA) / "raw_formats/faery_evt2.raw";
   if (!std::filesystem::exists(real)) GTEST_SKIP() << real << " is absent";
-  PropheseeRawStream stream(real);
-  EXPECT_EQ(stream.size().value_or(CameraSize{}).height, 480) << "a camera of generation 3";
-  const std::vector<Event> events = readStream(stream);
+  const auto stream = streamOf(real);
+  EXPECT_EQ(stream->size().value_or(CameraSize{}).height, 480) << "a camera of generation 3";
+  const std::vector<Event> events = readStream(*stream);
   // Counted with numpy.frombuffer(…, '<u4') behind the 166 bytes of the header: words of type 0 and
   // 1; the time is 64 times the last word of type 8 before them, plus the bits 22 to 27.
   ASSERT_EQ(events.size(), 521'252U);
