@@ -6,6 +6,9 @@
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/rawlog.h"
+#include "plugin/mrpt/window/map_scene.h"
+#include "plugin/recordings/open/mrpt_library.h"
 
 namespace efm {
 
@@ -28,5 +31,8 @@ const struct AtLoad {
 } kAtLoad;
 
 }  // namespace
-
 }  // namespace efm
+
+/// What the program loads of this library.
+extern "C" const efm::MrptLibrary efmMrptLibrary = {efm::openRawlog, efm::writeRawlog,
+                                                    efm::writeSimpleMap, efm::recordFrames};
