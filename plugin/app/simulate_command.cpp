@@ -122,37 +122,25 @@ int runSimulate(const SimulateArguments& arguments) {
 namespace {
 
 void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
-  constexpr const char* kGroup = "Pixels (ideal by default)";
-  command
-      .add_option("--threshold-on", arguments.threshold_on,
-                  "Increase of log intensity per ON event; by default the preset's, or 0.3")
-      ->group(kGroup);
-  command
-      .add_option("--threshold-off", arguments.threshold_off,
-                  "Decrease of log intensity per OFF event; by default the preset's, or 0.3")
-      ->group(kGroup);
-  command
-      .add_option("--mismatch", arguments.mismatch,
-                  "Standard deviation of the pixels' thresholds, as a fraction of them, 0 to 0.5")
-      ->capture_default_str()
-      ->group(kGroup);
-  command
-      .add_option("--refractory-us", arguments.refractory_us,
-                  "Dead time of a pixel after an event, in microseconds")
-      ->capture_default_str()
-      ->group(kGroup);
-  command
-      .add_option("--noise-hz", arguments.noise.background_hz,
-                  "Background noise: events per second and pixel")
-      ->capture_default_str()
-      ->group(kGroup);
-  command
-      .add_option("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
-      ->capture_default_str()
-      ->group(kGroup);
-  command.add_option("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
-      ->capture_default_str()
-      ->group(kGroup);
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    return command.add_option(name, value, help)->group("Pixels (ideal by default)");
+  };
+  add("--threshold-on", arguments.threshold_on,
+      "Increase of log intensity per ON event; by default the preset's, or 0.3");
+  add("--threshold-off", arguments.threshold_off,
+      "Decrease of log intensity per OFF event; by default the preset's, or 0.3");
+  add("--mismatch", arguments.mismatch,
+      "Standard deviation of the pixels' thresholds, as a fraction of them, 0 to 0.5")
+      ->capture_default_str();
+  add("--refractory-us", arguments.refractory_us,
+      "Dead time of a pixel after an event, in microseconds")
+      ->capture_default_str();
+  add("--noise-hz", arguments.noise.background_hz, "Background noise: events per second and pixel")
+      ->capture_default_str();
+  add("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
+      ->capture_default_str();
+  add("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
+      ->capture_default_str();
 }
 
 }  // namespace

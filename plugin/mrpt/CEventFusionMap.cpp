@@ -28,6 +28,92 @@ MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusion
 IMPLEMENTS_SERIALIZABLE(CEventFusionMap, CMetricMap, efm)
 
 namespace efm {
+namespace {
+
+using mrpt::maps::CPointsMapXYZI;
+using mrpt::obs::CObservationPointCloud;
+
+/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
+/// @param sigma standard deviation of depth of each point, metres; empty: not known.
+std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI& cloud,
+                                                           const std::vector<float>& sigma = {}) {
+  const auto& x = cloud.getPointsBufferRef_x();
+  const auto& y = cloud.getPointsBufferRef_y();
+  const auto& z = cloud.getPointsBufferRef_z();
+  const auto& confidence = cloud.getPointsBufferRef_intensity();
+  auto points = std::make_shared<std::vector<ViewPoint>>();
+  points->reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (confidence[i] == 0) continue;
+    points->push_back({{x[i], y[i], z[i]}, confidence[i]});
+    if (!sigma.empty()) points->back().sigma = sigma.at(i);
+  }
+  return points;
+}
+
+/// A keyframe from an observation of a point cloud with intensities.
+/// @return nothing for other observations.
+std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
+                                           const Rigid3& T_world_rig) {
+  const auto* seen = dynamic_cast<const CObservationPointCloud*>(&observation);
+  if (!seen) return std::nullopt;
+  seen->load();  // its points may be in an external file
+  const auto cloud = std::dynamic_pointer_cast<CPointsMapXYZI>(seen->pointcloud);
+  if (!cloud) return std::nullopt;
+  const std::int64_t t_ns =
+      seen->timestamp == INVALID_TIMESTAMP ? 0 : nanosecondsFrom(seen->timestamp);
+  return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), viewPointsOf(*cloud)};
+}
+
+/// MRPT reads these keys for every map, from a section of its own.
+void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  constexpr std::array<std::string_view, 3> kKnown = {
+      "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
+  std::vector<std::string> keys;
+  source.getAllKeys(section, keys);
+  for (const std::string& key : keys) {
+    if (std::find(kKnown.begin(), kKnown.end(), key) != kKnown.end()) continue;
+    throw std::invalid_argument(placeIn(source, section) + " " + key + ": unknown key");
+  }
+}
+
+/// Maps of version 0 had no consistency check.
+void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
+                     ConsistencyOptions& options) {
+  options.consistency = Consistency::kNone;
+  if (version == 0) return;
+  std::string name;
+  in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
+  options.consistency = consistencyFromName(name);
+  options.max_contradictions = in.ReadAs<std::int32_t>();
+}
+
+/// Maps of versions 0 and 1 had no sigma.
+std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CArchive& in,
+                                                         std::uint8_t version) {
+  CPointsMapXYZI cloud;
+  in >> cloud;
+  std::vector<float> sigma;
+  if (version >= 2) in >> sigma;
+  if (!sigma.empty() && sigma.size() != cloud.size()) {
+    throw std::runtime_error(fmt::format("an event fusion map with {} sigmas for {} points",
+                                         sigma.size(), cloud.size()));
+  }
+  return viewPointsOf(cloud, sigma);
+}
+
+/// Empty where none is known: a simplemap has no place for it.
+std::vector<float> sigmaOf(const std::vector<ViewPoint>& points) {
+  std::vector<float> sigma;
+  bool is_known = false;
+  for (const ViewPoint& point : points) {
+    sigma.push_back(point.sigma);
+    is_known = is_known || point.sigma == point.sigma;
+  }
+  return is_known ? sigma : std::vector<float>();
+}
+
+}  // namespace
 
 mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud) {
   auto map = mrpt::maps::CPointsMapXYZI::Create();
@@ -50,9 +136,6 @@ std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_s
       *step_m, voxel_size_m);
 }
 
-using mrpt::maps::CPointsMapXYZI;
-using mrpt::obs::CObservationPointCloud;
-
 CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe) {
   const std::vector<ViewPoint>& points = *keyframe.points;
   auto cloud = CPointsMapXYZI::Create();
@@ -64,34 +147,6 @@ CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe) {
   }
   cloud->mark_as_modified();
   return cloud;
-}
-
-std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI& cloud,
-                                                           const std::vector<float>& sigma) {
-  const auto& x = cloud.getPointsBufferRef_x();
-  const auto& y = cloud.getPointsBufferRef_y();
-  const auto& z = cloud.getPointsBufferRef_z();
-  const auto& confidence = cloud.getPointsBufferRef_intensity();
-  auto points = std::make_shared<std::vector<ViewPoint>>();
-  points->reserve(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (confidence[i] == 0) continue;
-    points->push_back({{x[i], y[i], z[i]}, confidence[i]});
-    if (!sigma.empty()) points->back().sigma = sigma.at(i);
-  }
-  return points;
-}
-
-std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
-                                           const Rigid3& T_world_rig) {
-  const auto* seen = dynamic_cast<const CObservationPointCloud*>(&observation);
-  if (!seen) return std::nullopt;
-  seen->load();  // its points may be in an external file
-  const auto cloud = std::dynamic_pointer_cast<CPointsMapXYZI>(seen->pointcloud);
-  if (!cloud) return std::nullopt;
-  const std::int64_t t_ns =
-      seen->timestamp == INVALID_TIMESTAMP ? 0 : nanosecondsFrom(seen->timestamp);
-  return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), viewPointsOf(*cloud)};
 }
 
 void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
@@ -134,47 +189,6 @@ void writeSimpleMap(const std::filesystem::path& file,
   if (map.saveToFile(file.string())) return;
   throw std::runtime_error("the file cannot be created or the disk is full");
 }
-
-namespace {
-
-/// MRPT reads these keys for every map, from a section of its own.
-void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
-  constexpr std::array<std::string_view, 3> kKnown = {
-      "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
-  std::vector<std::string> keys;
-  source.getAllKeys(section, keys);
-  for (const std::string& key : keys) {
-    if (std::find(kKnown.begin(), kKnown.end(), key) != kKnown.end()) continue;
-    throw std::invalid_argument(placeIn(source, section) + " " + key + ": unknown key");
-  }
-}
-
-/// Maps of version 0 had no consistency check.
-void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
-                     ConsistencyOptions& options) {
-  options.consistency = Consistency::kNone;
-  if (version == 0) return;
-  std::string name;
-  in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
-  options.consistency = consistencyFromName(name);
-  options.max_contradictions = in.ReadAs<std::int32_t>();
-}
-
-/// Maps of versions 0 and 1 had no sigma.
-std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CArchive& in,
-                                                         std::uint8_t version) {
-  CPointsMapXYZI cloud;
-  in >> cloud;
-  std::vector<float> sigma;
-  if (version >= 2) in >> sigma;
-  if (!sigma.empty() && sigma.size() != cloud.size()) {
-    throw std::runtime_error(fmt::format("an event fusion map with {} sigmas for {} points",
-                                         sigma.size(), cloud.size()));
-  }
-  return viewPointsOf(cloud, sigma);
-}
-
-}  // namespace
 
 using mrpt::maps::CSimplePointsMap;
 using mrpt::serialization::CArchive;
@@ -268,21 +282,6 @@ double CEventFusionMap::internal_computeObservationLikelihood(
 }
 
 // --- Storing ---------------------------------------------------------------------------------
-
-namespace {
-
-/// Empty where none is known: a simplemap has no place for it.
-std::vector<float> sigmaOf(const std::vector<ViewPoint>& points) {
-  std::vector<float> sigma;
-  bool is_known = false;
-  for (const ViewPoint& point : points) {
-    sigma.push_back(point.sigma);
-    is_known = is_known || point.sigma == point.sigma;
-  }
-  return is_known ? sigma : std::vector<float>();
-}
-
-}  // namespace
 
 std::uint8_t CEventFusionMap::serializeGetVersion() const { return 2; }
 

@@ -29,16 +29,6 @@ std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_s
 
 /// The points of a keyframe in frame `ref`, float, intensity = confidence.
 mrpt::maps::CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe);
-/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
-/// @param sigma standard deviation of depth of each point, metres; empty: not known.
-std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const mrpt::maps::CPointsMapXYZI& cloud,
-                                                           const std::vector<float>& sigma = {});
-
-/// A keyframe from an observation of a point cloud with intensities.
-/// @return nothing for other observations.
-std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
-                                           const Rigid3& T_world_rig);
-
 /// Adds the keyframe to a simplemap in MRPT's own classes, for any MRPT program: the view's pose in
 /// the world without covariance, and a frame with one CObservationPointCloud. Its label is
 /// "keyframe", its time t_ref (rounded to MRPT's tick), its sensor pose the identity.

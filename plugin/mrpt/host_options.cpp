@@ -30,18 +30,20 @@ std::string nameOf(const mrpt::config::CConfigFileBase& source) {
   return file.empty() ? "options" : file.string();
 }
 
-}  // namespace
-
-std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
-  return nameOf(source) + ", section " + section + ":";
-}
-
+/// Where the values of a section come from: `placeIn`, and the folder of the host's file. Without a
+/// file, the folder is empty: the working folder.
 OptionOrigin originIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
   OptionOrigin origin{placeIn(source, section), {}};
   // Absolute, so that options saved to another folder name the same files.
   const std::filesystem::path file = fileOf(source);
   if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
   return origin;
+}
+
+}  // namespace
+
+std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  return nameOf(source) + ", section " + section + ":";
 }
 
 std::vector<std::string> sectionsBelow(const mrpt::config::CConfigFileBase& source,

@@ -35,10 +35,6 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
 std::vector<std::string> sectionsBelow(const mrpt::config::CConfigFileBase& source,
                                        const std::string& prefix);
 
-/// Where the values of a section come from: `placeIn`, and the folder of the host's file. Without a
-/// file, the folder is empty: the working folder.
-OptionOrigin originIn(const mrpt::config::CConfigFileBase& source, const std::string& section);
-
 /// The beginning of errors: "host.ini, section mapper_dsi:", or "options, section ..." without a
 /// file. Without brackets: MRPT interprets brackets and reorders the message.
 std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::string& section);

@@ -45,73 +45,6 @@ std::string reasonOf(gzFile file) {
   return colon == std::string::npos ? text : text.substr(colon + 2);
 }
 
-}  // namespace
-
-GzStream::GzStream(const std::filesystem::path& file, Mode mode) : file_(nullptr, gzclose) {
-  constexpr unsigned kBufferSize = 1U << 18U;
-  const std::filesystem::file_status status = std::filesystem::status(file);
-  if (mode == Mode::kRead && !std::filesystem::is_regular_file(status)) {
-    const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
-                             : std::filesystem::exists(status)     ? "not a regular file"
-                                                                   : "no such file";
-    throw std::runtime_error(file.string() + ": " + what);
-  }
-  if (mode == Mode::kRead) file_size_ = std::filesystem::file_size(file);
-  file_.reset(gzopen(file.c_str(), mode == Mode::kRead    ? "rb"
-                                   : mode == Mode::kWrite ? "wb1"
-                                                          : "wbT"));
-  if (!file_) throw std::runtime_error(file.string() + ": cannot be opened: " + systemReason());
-  gzbuffer(file_.get(), kBufferSize);
-}
-
-bool GzStream::atEnd() {
-  const int byte = gzgetc(file_.get());
-  if (byte >= 0) {
-    gzungetc(byte, file_.get());
-    return false;
-  }
-  int code = Z_OK;
-  gzerror(file_.get(), &code);  // also of a truncated file
-  if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
-  return true;
-}
-
-double GzStream::progress() const {
-  const auto offset = static_cast<double>(gzoffset(file_.get()));
-  return file_size_ == 0 ? 1.0 : std::clamp(offset / static_cast<double>(file_size_), 0.0, 1.0);
-}
-
-void GzStream::close() {
-  if (file_ && gzclose(file_.release()) != Z_OK) {
-    throw std::runtime_error("cannot be completed: " + systemReason());
-  }
-}
-
-std::size_t GzStream::Read(void* buffer, std::size_t count) {
-  const std::size_t done = gzfread(buffer, 1, count, file_.get());
-  if (done < count) atEnd();
-  return done;
-}
-
-std::size_t GzStream::Write(const void* buffer, std::size_t count) {
-  if (gzfwrite(buffer, 1, count, file_.get()) != count) {
-    throw std::runtime_error(reasonOf(file_.get()));
-  }
-  return count;
-}
-
-std::uint64_t GzStream::Seek(std::int64_t, TSeekOrigin) {
-  throw std::logic_error("a stream goes forward");
-}
-std::uint64_t GzStream::getTotalBytesCount() const {
-  throw std::logic_error("a stream has no known size");
-}
-std::uint64_t GzStream::getPosition() const {
-  return static_cast<std::uint64_t>(gztell(file_.get()));
-}
-
-namespace {
-
 /// Removes the text up to the end of the last occurrence of a word.
 void dropThrough(std::string_view& text, std::string_view last) {
   const auto at = text.rfind(last);
@@ -148,10 +81,6 @@ std::string reasonOf(const std::exception& error) {
   reason.erase(0, reason.find_first_not_of(" \t\r\n"));
   return reason.empty() ? "unreadable" : printable(reason, kMaxCharacters);
 }
-
-}  // namespace
-
-namespace {
 
 using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
@@ -321,10 +250,6 @@ class RawlogOthers : public OtherStream {
   RawlogReader reader_;
 };
 
-}  // namespace
-
-namespace {
-
 /// A pose that cannot be used is an error at the recording's end.
 void addPose(const CObservation::Ptr& observation, const std::string& position,
              const ReaderOptions& options, RecordingParts& parts) {
@@ -335,47 +260,6 @@ void addPose(const CObservation::Ptr& observation, const std::string& position,
     if (parts.poses_damage.empty()) parts.poses_damage = position + ": " + error.what();
   }
 }
-
-}  // namespace
-
-RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options) {
-  RecordingParts parts;
-  parts.rounded = true;
-  std::map<int, CObservationEvents::Ptr> cameras;
-  bool has_others = false;
-  RawlogReader reader(file);
-  try {
-    while (const CObservation::Ptr observation = reader.next()) {
-      if (const auto packet = asPacket(observation)) {
-        cameras.emplace(packet->camera_index, packet);
-      } else if (poseSourceOf(*observation)) {
-        addPose(observation, reader.position(), options, parts);
-      } else {
-        has_others = true;
-      }
-    }
-  } catch (const std::runtime_error& error) {
-    if (cameras.empty() && parts.pose_samples.empty() && !has_others) throw;
-    if (cameras.empty()) parts.poses_damage = error.what();
-  }
-  Calibration calibration{file, {}};
-  bool is_calibrated = false;  // at least one camera: of another one, the mapping says it
-  for (const auto& [index, first] : cameras) {
-    if (index != static_cast<int>(calibration.rig.cameras.size())) {
-      throw std::runtime_error(
-          fmt::format("{}: the recording has events of camera {} but none of camera {}",
-                      file.string(), index, calibration.rig.cameras.size()));
-    }
-    calibration.rig.cameras.push_back(calibrationOf(*first));
-    is_calibrated = is_calibrated || isCalibrated(first->camera);
-    parts.cameras.push_back(std::make_unique<RawlogEvents>(file, first));
-  }
-  if (is_calibrated) parts.calibration = std::move(calibration);
-  if (has_others) parts.others = std::make_unique<RawlogOthers>(file);
-  return parts;
-}
-
-namespace {
 
 CObservation::Ptr packetOf(EventPacket packet) {
   const auto original = std::static_pointer_cast<const CObservationEvents>(packet.original);
@@ -409,17 +293,6 @@ CObservation::Ptr poseOf(const PoseSample& pose) {
   }
   return observation;
 }
-
-}  // namespace
-
-CObservation::Ptr observationOf(Sample sample) {
-  if (auto* packet = std::get_if<EventPacket>(&sample)) return packetOf(std::move(*packet));
-  if (const auto* pose = std::get_if<PoseSample>(&sample)) return poseOf(*pose);
-  return std::const_pointer_cast<CObservation>(
-      std::static_pointer_cast<const CObservation>(std::get<OtherSample>(sample).original));
-}
-
-namespace {
 
 class GzRawlogWriter : public RawlogWriter {
  public:
@@ -458,6 +331,113 @@ class GzRawlogWriter : public RawlogWriter {
 };
 
 }  // namespace
+
+GzStream::GzStream(const std::filesystem::path& file, Mode mode) : file_(nullptr, gzclose) {
+  constexpr unsigned kBufferSize = 1U << 18U;
+  const std::filesystem::file_status status = std::filesystem::status(file);
+  if (mode == Mode::kRead && !std::filesystem::is_regular_file(status)) {
+    const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
+                             : std::filesystem::exists(status)     ? "not a regular file"
+                                                                   : "no such file";
+    throw std::runtime_error(file.string() + ": " + what);
+  }
+  if (mode == Mode::kRead) file_size_ = std::filesystem::file_size(file);
+  file_.reset(gzopen(file.c_str(), mode == Mode::kRead    ? "rb"
+                                   : mode == Mode::kWrite ? "wb1"
+                                                          : "wbT"));
+  if (!file_) throw std::runtime_error(file.string() + ": cannot be opened: " + systemReason());
+  gzbuffer(file_.get(), kBufferSize);
+}
+
+bool GzStream::atEnd() {
+  const int byte = gzgetc(file_.get());
+  if (byte >= 0) {
+    gzungetc(byte, file_.get());
+    return false;
+  }
+  int code = Z_OK;
+  gzerror(file_.get(), &code);  // also of a truncated file
+  if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
+  return true;
+}
+
+double GzStream::progress() const {
+  const auto offset = static_cast<double>(gzoffset(file_.get()));
+  return file_size_ == 0 ? 1.0 : std::clamp(offset / static_cast<double>(file_size_), 0.0, 1.0);
+}
+
+void GzStream::close() {
+  if (file_ && gzclose(file_.release()) != Z_OK) {
+    throw std::runtime_error("cannot be completed: " + systemReason());
+  }
+}
+
+std::size_t GzStream::Read(void* buffer, std::size_t count) {
+  const std::size_t done = gzfread(buffer, 1, count, file_.get());
+  if (done < count) atEnd();
+  return done;
+}
+
+std::size_t GzStream::Write(const void* buffer, std::size_t count) {
+  if (gzfwrite(buffer, 1, count, file_.get()) != count) {
+    throw std::runtime_error(reasonOf(file_.get()));
+  }
+  return count;
+}
+
+std::uint64_t GzStream::Seek(std::int64_t, TSeekOrigin) {
+  throw std::logic_error("a stream goes forward");
+}
+std::uint64_t GzStream::getTotalBytesCount() const {
+  throw std::logic_error("a stream has no known size");
+}
+std::uint64_t GzStream::getPosition() const {
+  return static_cast<std::uint64_t>(gztell(file_.get()));
+}
+
+RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options) {
+  RecordingParts parts;
+  parts.rounded = true;
+  std::map<int, CObservationEvents::Ptr> cameras;
+  bool has_others = false;
+  RawlogReader reader(file);
+  try {
+    while (const CObservation::Ptr observation = reader.next()) {
+      if (const auto packet = asPacket(observation)) {
+        cameras.emplace(packet->camera_index, packet);
+      } else if (poseSourceOf(*observation)) {
+        addPose(observation, reader.position(), options, parts);
+      } else {
+        has_others = true;
+      }
+    }
+  } catch (const std::runtime_error& error) {
+    if (cameras.empty() && parts.pose_samples.empty() && !has_others) throw;
+    if (cameras.empty()) parts.poses_damage = error.what();
+  }
+  Calibration calibration{file, {}};
+  bool is_calibrated = false;  // at least one camera: of another one, the mapping says it
+  for (const auto& [index, first] : cameras) {
+    if (index != static_cast<int>(calibration.rig.cameras.size())) {
+      throw std::runtime_error(
+          fmt::format("{}: the recording has events of camera {} but none of camera {}",
+                      file.string(), index, calibration.rig.cameras.size()));
+    }
+    calibration.rig.cameras.push_back(calibrationOf(*first));
+    is_calibrated = is_calibrated || isCalibrated(first->camera);
+    parts.cameras.push_back(std::make_unique<RawlogEvents>(file, first));
+  }
+  if (is_calibrated) parts.calibration = std::move(calibration);
+  if (has_others) parts.others = std::make_unique<RawlogOthers>(file);
+  return parts;
+}
+
+CObservation::Ptr observationOf(Sample sample) {
+  if (auto* packet = std::get_if<EventPacket>(&sample)) return packetOf(std::move(*packet));
+  if (const auto* pose = std::get_if<PoseSample>(&sample)) return poseOf(*pose);
+  return std::const_pointer_cast<CObservation>(
+      std::static_pointer_cast<const CObservation>(std::get<OtherSample>(sample).original));
+}
 
 std::unique_ptr<RawlogWriter> writeRawlog(const std::filesystem::path& file,
                                           RawlogCompression compression) {

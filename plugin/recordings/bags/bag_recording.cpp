@@ -8,6 +8,7 @@
 #include <cctype>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -16,6 +17,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"
+#include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/bags/ros_messages.h"
 
 namespace efm {
@@ -44,7 +46,7 @@ bool isCompressedBag(const fs::path& file) {
 
 std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
   if (isCompressedBag(file)) refuseCompressed(file);
-  const bool ros1 = isRos1Bag(file);
+  const bool ros1 = looksLikeRosbag(file);
 #ifdef EFM_WITH_ROSBAG
   if (ros1) return openRos1Bag(file);
 #endif
@@ -52,7 +54,7 @@ std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
   if (beginsWith(file, kDb3Start)) return openDb3(file);
   if (beginsWith(file, kMcapStart)) return openMcap(file);
 #endif
-  if (ros1 || isRos2Bag(file)) {
+  if (ros1 || looksLikeRosbag2(file)) {
     throw std::runtime_error(fmt::format("{}: this build does not read bags of ROS {} ({})",
                                          file.string(), ros1 ? 1 : 2,
                                          ros1 ? "EFM_READ_ROSBAG" : "EFM_READ_ROS2"));
@@ -86,19 +88,7 @@ std::vector<fs::path> filesOfMetadata(const fs::path& metadata) {
   return files;
 }
 
-}  // namespace
-
-bool isRos1Bag(const fs::path& file) { return beginsWith(file, kRos1Start); }
-
-bool isRos2Bag(const fs::path& source) {
-  if (isFile(source / kMetadata)) {
-    std::ifstream stream(source / kMetadata);
-    std::string line;
-    return std::getline(stream, line) && line.rfind("rosbag2_bagfile_information", 0) == 0;
-  }
-  return beginsWith(source, kDb3Start) || beginsWith(source, kMcapStart) || isCompressedBag(source);
-}
-
+/// The bags of a file, or of a folder's metadata.yaml in its order.
 std::vector<std::shared_ptr<BagSource>> openBagFiles(const fs::path& source) {
   std::vector<std::shared_ptr<BagSource>> bags;
   if (!isFile(source / kMetadata)) {
@@ -110,8 +100,6 @@ std::vector<std::shared_ptr<BagSource>> openBagFiles(const fs::path& source) {
   }
   return bags;
 }
-
-namespace {
 
 /// A topic of the recording, in all bags that have it.
 struct RosTopic {
@@ -313,8 +301,16 @@ void addCalibration(const RosTopics& topics, const RosTopics& cameras, Recording
 
 }  // namespace
 
-bool looksLikeRosbag(const std::filesystem::path& file) { return isRos1Bag(file); }
-bool looksLikeRosbag2(const std::filesystem::path& source) { return isRos2Bag(source); }
+bool looksLikeRosbag(const fs::path& file) { return beginsWith(file, kRos1Start); }
+
+bool looksLikeRosbag2(const fs::path& source) {
+  if (isFile(source / kMetadata)) {
+    std::ifstream stream(source / kMetadata);
+    std::string line;
+    return std::getline(stream, line) && line.rfind("rosbag2_bagfile_information", 0) == 0;
+  }
+  return beginsWith(source, kDb3Start) || beginsWith(source, kMcapStart) || isCompressedBag(source);
+}
 
 RecordingParts openBags(const std::vector<std::filesystem::path>& files,
                         const ReaderOptions& options) {

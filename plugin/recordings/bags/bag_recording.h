@@ -2,22 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <vector>
 
-#include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
-
-/// Whether a file or folder is a bag of ROS 1. Never throws.
-bool isRos1Bag(const std::filesystem::path& file);
-/// Whether it is a bag of ROS 2: a database, an MCAP file, either compressed as a whole, or a
-/// folder with metadata.yaml.
-bool isRos2Bag(const std::filesystem::path& source);
-
-/// The bags of a file, or of a folder's metadata.yaml in its order.
-std::vector<std::shared_ptr<BagSource>> openBagFiles(const std::filesystem::path& source);
 
 /// Recordings in ROS bags: ROS 1 (.bag) and ROS 2 (.db3, .mcap, or the folder with metadata.yaml).
 /// Several files are one recording: a topic that is in several of them continues.
@@ -34,8 +23,10 @@ std::vector<std::shared_ptr<BagSource>> openBagFiles(const std::filesystem::path
 /// (/davis/left/camera_info for /davis/left/events). It has no extrinsics, so only one camera takes
 /// its calibration from there; several need a file.
 
-/// Whether a file or folder is such a bag. Never throws.
+/// Whether a file is a bag of ROS 1. Never throws.
 bool looksLikeRosbag(const std::filesystem::path& file);
+/// Whether it is a bag of ROS 2: a database, an MCAP file, either compressed as a whole, or a
+/// folder with metadata.yaml. Never throws.
 bool looksLikeRosbag2(const std::filesystem::path& source);
 
 /// @throws std::runtime_error naming the file, topic or byte that is wrong, or the library that

@@ -15,6 +15,8 @@ bool contains(const std::string& text, std::string_view part) {
   return text.find(part) != std::string::npos;
 }
 
+bool isHdf5File(const fs::path& file) { return beginsWith(file, "\x89HDF\r\n\x1a\n"); }
+
 bool mayBeHdf5(const fs::path& file) {
   const std::string extension = file.extension().string();
   return (extension == ".h5" || extension == ".hdf5") &&
@@ -51,8 +53,6 @@ void addFiles(const fs::path& folder, int depth, std::vector<fs::path>& files) {
 }
 
 }  // namespace
-
-bool isHdf5File(const fs::path& file) { return beginsWith(file, "\x89HDF\r\n\x1a\n"); }
 
 std::vector<CameraFile> hdf5FilesIn(const fs::path& folder) {
   constexpr int kDepth = 2;

@@ -16,9 +16,6 @@ struct CameraFile {
   std::filesystem::path file;
 };
 
-/// Whether it is an HDF5 file, by its first bytes.
-bool isHdf5File(const std::filesystem::path& file);
-
 /// The HDF5 files of a recording's folder as the data sets are downloaded and unpacked: files of
 /// the folder, of folders in it whose names contain "event", and of a folder per camera in these:
 ///   events/left/events.h5, events/right/events.h5              DSEC, event-fusion's export

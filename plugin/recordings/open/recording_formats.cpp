@@ -10,6 +10,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/columns/event_arrays.h"
@@ -19,6 +20,7 @@
 #include "plugin/recordings/streams/file_content.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
+#include "plugin/recordings/text/pose_text.h"
 
 namespace efm {
 namespace {
@@ -211,6 +213,76 @@ std::optional<std::string> unreadFolder(const fs::path& folder) {
   return std::nullopt;
 }
 
+bool isNameCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == ':' || c == '<' || c == '>' || c == ',';
+}
+
+/// Whether these are the first bytes of an object: the length of its class's name, the name, the
+/// content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the
+/// lowest first. A truncated file may have fewer bytes.
+bool beginsAnObject(std::string_view bytes) {
+  constexpr std::size_t kShortestName = 3;
+  constexpr std::size_t kLongestName = 120;
+  constexpr unsigned kTopBit = 0x80;
+  const unsigned first = static_cast<unsigned char>(bytes.front());
+  const bool short_form = (first & kTopBit) != 0;
+  const std::size_t length = first & ~kTopBit;
+  if (length < kShortestName || length > kLongestName) return false;
+  bytes.remove_prefix(1);
+  if (!short_form) {
+    const std::string_view zeros = bytes.substr(0, 3);
+    if (!std::all_of(zeros.begin(), zeros.end(), [](char c) { return c == '\0'; })) return false;
+    bytes.remove_prefix(zeros.size());
+  }
+  const std::string_view name = bytes.substr(0, length);
+  return std::all_of(name.begin(), name.end(), isNameCharacter);
+}
+
+/// The first bytes of the content; nothing of what cannot be read.
+std::string firstBytes(const fs::path& file) {
+  constexpr std::size_t kBytes = 4096;
+  std::string bytes(kBytes, '\0');
+  FileContent content(file);
+  bytes.resize(content.read(bytes.data(), kBytes));
+  return bytes;
+}
+
+void refuseUnread(const fs::path& file) {
+  if (isCompressed(file) || fs::is_directory(file)) return;
+  if (const auto unread = unreadFormat(file)) {
+    throw std::runtime_error(file.string() + ": " + *unread);
+  }
+}
+
+std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions options) {
+  const RecordingFormat* const format = detectFormat(file);
+  if (format == nullptr) {
+    refuseUnread(file);
+    throw std::runtime_error(file.string() +
+                             ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
+                             "columns with a header), NumPy arrays, or a recording with poses");
+  }
+  options.topics_of_other_files = true;  // they are those of the events, too
+  RecordingParts parts = format->open({file}, options);
+  if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
+  if (!parts.poses.empty()) return std::move(parts.poses);
+  throw std::runtime_error(
+      fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));
+}
+
+std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions& options) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
+  if (looksLikeNumpy(file)) return readPoseArrays(file, options);
+  const std::string start = firstBytes(file);
+  requireTextLines(start, file.string());
+  if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
+  if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
+  refuseUnread(file);
+  return readPoseText(file, options);
+}
+
 }  // namespace
 
 std::optional<std::string> unreadFormat(const fs::path& source) {
@@ -263,36 +335,6 @@ const std::vector<RecordingFormat>& readerFormats() {
   return all;
 }
 
-namespace {
-
-bool isNameCharacter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-         c == ':' || c == '<' || c == '>' || c == ',';
-}
-
-/// Whether these are the first bytes of an object: the length of its class's name, the name, the
-/// content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the
-/// lowest first. A truncated file may have fewer bytes.
-bool beginsAnObject(std::string_view bytes) {
-  constexpr std::size_t kShortestName = 3;
-  constexpr std::size_t kLongestName = 120;
-  constexpr unsigned kTopBit = 0x80;
-  const unsigned first = static_cast<unsigned char>(bytes.front());
-  const bool short_form = (first & kTopBit) != 0;
-  const std::size_t length = first & ~kTopBit;
-  if (length < kShortestName || length > kLongestName) return false;
-  bytes.remove_prefix(1);
-  if (!short_form) {
-    const std::string_view zeros = bytes.substr(0, 3);
-    if (!std::all_of(zeros.begin(), zeros.end(), [](char c) { return c == '\0'; })) return false;
-    bytes.remove_prefix(zeros.size());
-  }
-  const std::string_view name = bytes.substr(0, length);
-  return std::all_of(name.begin(), name.end(), isNameCharacter);
-}
-
-}  // namespace
-
 std::optional<std::string> whyNoRawlog(const std::filesystem::path& file) {
   constexpr std::size_t kBytes = 128;
   constexpr std::size_t kShown = 24;
@@ -327,6 +369,13 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source) {
     if (format.matches(source)) return &format;
   }
   return nullptr;
+}
+
+std::vector<StampedPose> readPoses(const fs::path& file, const ReaderOptions& options) {
+  std::vector<StampedPose> poses = readAnyPoses(file, options);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
 }
 
 }  // namespace efm

@@ -45,6 +45,11 @@ cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
   return levels;
 }
 
+/// The axis of depths between two limits: linear in inverse depth.
+AxisRange depthAxis(const DepthPlanesOptions& limits) {
+  return {limits.min_depth_m, limits.max_depth_m, AxisScale::kInverse};
+}
+
 }  // namespace
 
 cv::Mat3b drawBar(const AxisRange& range, Palette palette, const std::string& unit, int width) {
@@ -158,10 +163,6 @@ cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width) {
     }
   }
   return small;
-}
-
-AxisRange depthAxis(const DepthPlanesOptions& limits) {
-  return {limits.min_depth_m, limits.max_depth_m, AxisScale::kInverse};
 }
 
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {

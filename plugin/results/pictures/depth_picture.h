@@ -43,9 +43,6 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
 /// each, so that thin edges stay.
 cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width);
 
-/// The axis of depths between two limits: linear in inverse depth.
-AxisRange depthAxis(const DepthPlanesOptions& limits);
-
 /// A depth map for a paper: perceptual colours, the confidence in light grey under the depths, a
 /// colour bar in metres. Images of small sensors are enlarged by a whole factor.
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits);
