@@ -42,7 +42,7 @@ inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
 struct SimulationOptions {
   std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
   /// Seconds, 0.001 to 600. Default: the preset's duration.
-  std::optional<double> duration_s;
+  std::optional<double> duration_s = std::nullopt;
   /// Seed of everything random: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
 
@@ -63,7 +63,7 @@ struct TrajectorySimulationOptions {
   /// Start time in the trajectory's clock. Default: `startOfMotion`.
   std::optional<std::int64_t> start_ns;
   /// Seconds, 0.001 to 600. Default: 5, or less where the trajectory ends earlier.
-  std::optional<double> duration_s;
+  std::optional<double> duration_s = std::nullopt;
   std::uint64_t seed = 1;
 
   void validate() const;
