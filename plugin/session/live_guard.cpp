@@ -171,8 +171,18 @@ bool LiveGuard::countRejectedPose() {
   return options_.enabled;
 }
 
-std::optional<LiveStatus> LiveGuard::status() const {
-  return options_.enabled ? std::optional(status_) : std::nullopt;
+std::optional<LiveStatus> LiveGuard::status(const std::map<int, std::uint64_t>& rejected,
+                                            const MapperCounts& counts,
+                                            const std::vector<int>& selected) const {
+  if (!options_.enabled) return std::nullopt;
+  LiveStatus status = status_;
+  for (const auto& [camera, events] : rejected) status.cameras[camera].lost += events;
+  for (std::size_t c = 0; c < counts.cameras.size(); ++c) {
+    const auto camera = static_cast<int>(c);
+    if (!isSelected(camera, selected)) continue;
+    status.cameras[camera].lost += counts.cameras[c].dropped + counts.cameras[c].without_pose;
+  }
+  return status;
 }
 
 }  // namespace efm

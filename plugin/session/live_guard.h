@@ -108,8 +108,11 @@ class LiveGuard {
   /// Counts a rejected pose. @return false in playback, where it is an error.
   bool countRejectedPose();
   void setTooLarge(const std::string& why) { status_.too_large = why; }
-  /// What the guard counted; std::nullopt in playback.
-  std::optional<LiveStatus> status() const;
+  /// What the guard counted, and the events that each camera lost; std::nullopt in playback.
+  /// @param rejected events of rejected packets, by camera. @param selected see isSelected.
+  std::optional<LiveStatus> status(const std::map<int, std::uint64_t>& rejected = {},
+                                   const MapperCounts& counts = {},
+                                   const std::vector<int>& selected = {}) const;
 
  private:
   bool isJump(const NoisyPose& pose) const;

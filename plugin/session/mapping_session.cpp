@@ -433,24 +433,13 @@ std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
   status.held_events = heldEvents();
-  status.live = guard_.status();
   status.counts = earlier_counts_;
   status.counts += mapper_.counts();
+  status.live = guard_.status(status.refused_events, status.counts, options_.mapper.cameras);
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();
   status.silent_keyframes.resize(status.rig.cameras.size());
-  if (status.live) {
-    for (const auto& [camera, events] : status.refused_events) {
-      status.live->cameras[camera].lost += events;
-    }
-    for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
-      const auto camera = static_cast<int>(c);
-      if (!isSelected(camera, options_.mapper.cameras)) continue;
-      const EventCounts& counts = status.counts.cameras[c];
-      status.live->cameras[camera].lost += counts.dropped + counts.without_pose;
-    }
-  }
   status.recalibrated_cameras = rig_.recalibratedCameras();
   if (refinement_) {
     status.refinement = refinement_->state();
