@@ -108,10 +108,10 @@ std::uint64_t FilteredEvents::release(std::int64_t until_ns, EventBuffer& buffer
   const auto kept = static_cast<std::size_t>(last - at(waiting_.begin));
   if (buffer.begin == buffer.events.size() && kept > buffer.events.capacity()) {
     // After a wait the memory changes hands: a copy would hold all events twice.
-    const std::vector<Event> rest(at(end), waiting_.events.end());
+    EventBuffer rest;  // complete before the exchange: memory may fail
+    rest.insert({waiting_.events.data() + end, waiting_.events.data() + waiting_.events.size()});
     waiting_.cut(waiting_.begin + kept);
-    buffer = std::exchange(waiting_, {});
-    waiting_.insert(rest);
+    buffer = std::exchange(waiting_, std::move(rest));
   } else {
     buffer.insert({&*at(waiting_.begin), &*at(waiting_.begin) + kept});
     waiting_.begin = end;
