@@ -43,18 +43,6 @@ class PosedTimes {
 
 }  // namespace
 
-EventCounts& EventCounts::operator+=(const EventCounts& other) {
-  read += other.read;
-  used += other.used;
-  without_pose += other.without_pose;
-  outside_window += other.outside_window;
-  filtered += other.filtered;
-  dropped += other.dropped;
-  outside_lens += other.outside_lens;
-  over_budget += other.over_budget;
-  return *this;
-}
-
 CameraStream::CameraStream(int index, const RigCamera& camera, bool selected,
                            std::vector<bool> outside_lens, const EventFilterOptions& filter)
     : index_(index),
@@ -111,7 +99,7 @@ std::uint64_t CameraStream::dropLate(std::vector<Event>& events) {
   const auto count = static_cast<std::uint64_t>(events.end() - late);
   events.erase(late, events.end());
   counts_.read += count;
-  counts_.dropped += count;
+  counts_[EventFate::kDropped] += count;
   return count;
 }
 
@@ -123,23 +111,23 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
     newest_ns_ = std::max(newest_ns_.value_or(event.t_ns), event.t_ns);
   }
   const auto isUnwanted = [&](const Event& event) {
-    std::uint64_t* reason = nullptr;
+    std::optional<EventFate> fate;
     if (selected_ && !limits.contain(event.t_ns)) {
-      reason = &counts_.outside_window;
+      fate = EventFate::kOutsideWindow;
     } else if (!selected_ || event.t_ns < released_ns) {
-      reason = &counts_.dropped;
+      fate = EventFate::kDropped;
     } else if (isOutsideLens(event)) {
-      reason = &counts_.outside_lens;
+      fate = EventFate::kOutsideLens;
     }
-    if (reason != nullptr) ++*reason;
-    return reason != nullptr;
+    if (fate) ++counts_[*fate];
+    return fate.has_value();
   };
   events.erase(std::remove_if(events.begin(), events.end(), isUnwanted), events.end());
   covered_ns_ = std::max(covered_ns_, *newest_ns_ - kMaxEventDelayNs);
   try {
     return filter_ ? filter_->insert(events) : buffer_.insert(events);
   } catch (const std::bad_alloc&) {
-    counts_.dropped += events.size();
+    counts_[EventFate::kDropped] += events.size();
     throw;
   }
 }
@@ -151,7 +139,7 @@ void CameraStream::coverUntil(std::int64_t t_ns) {
 }
 
 void CameraStream::filterUntil(std::int64_t t_ns) {
-  if (filter_) counts_.filtered += filter_->release(t_ns, buffer_);
+  if (filter_) counts_[EventFate::kFiltered] += filter_->release(t_ns, buffer_);
 }
 
 std::optional<std::int64_t> CameraStream::firstFrom(std::int64_t t_ns) const {
@@ -189,12 +177,12 @@ void CameraStream::markUsed(const Window& window, const Trajectory& trajectory,
   }
 }
 
-void CameraStream::giveUp(std::int64_t t0_ns, std::int64_t t1_ns) {
+void CameraStream::dropWindows(std::int64_t t0_ns, std::int64_t t1_ns) {
   if (t0_ns >= t1_ns) return;
-  if (!given_up_.empty() && given_up_.back().t1_ns >= t0_ns) {
-    given_up_.back().t1_ns = std::max(given_up_.back().t1_ns, t1_ns);
+  if (!dropped_.empty() && dropped_.back().t1_ns >= t0_ns) {
+    dropped_.back().t1_ns = std::max(dropped_.back().t1_ns, t1_ns);
   } else {
-    given_up_.push_back({t0_ns, t1_ns, t0_ns});
+    dropped_.push_back({t0_ns, t1_ns, t0_ns});
   }
 }
 
@@ -203,19 +191,13 @@ void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) 
   const std::size_t end = buffer_.indexOf(until_ns);
   for (; buffer_.begin < end; ++buffer_.begin) {
     const std::int64_t t_ns = buffer_.events[buffer_.begin].t_ns;
-    if (buffer_.used[buffer_.begin]) {
-      ++counts_.used;
-    } else if (!posed.contain(t_ns)) {
-      ++counts_.without_pose;
-    } else if (isInOneOf(over_budget_, t_ns)) {
-      ++counts_.over_budget;
-    } else if (isInOneOf(given_up_, t_ns)) {
-      ++counts_.dropped;
-    } else {
-      ++counts_.outside_window;
-    }
+    ++counts_[buffer_.used[buffer_.begin]     ? EventFate::kUsed
+              : !posed.contain(t_ns)          ? EventFate::kWithoutPose
+              : isInOneOf(over_budget_, t_ns) ? EventFate::kOverBudget
+              : isInOneOf(dropped_, t_ns)     ? EventFate::kDropped
+                                              : EventFate::kOutsideWindow];
   }
-  for (std::vector<Window>* windows : {&over_budget_, &given_up_}) {
+  for (std::vector<Window>* windows : {&over_budget_, &dropped_}) {
     windows->erase(std::remove_if(windows->begin(), windows->end(),
                                   [&](const Window& window) { return window.t1_ns <= until_ns; }),
                    windows->end());

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/events/event.h"
+#include "mapping/events/event_fate.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
@@ -14,23 +15,6 @@
 #include "mapping/geometry/trajectory.h"
 
 namespace efm {
-
-/// What became of one camera's events. Distinct events: read = used + all others.
-struct EventCounts {
-  std::uint64_t read = 0;
-  std::uint64_t used = 0;            ///< Voted in at least one keyframe.
-  std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at this time.
-  std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
-  /// Came too late, in windows that were given up, or of an unselected camera.
-  std::uint64_t dropped = 0;
-  std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
-  /// Not used: the lens model has no viewing ray for this pixel (`LensInverse`).
-  std::uint64_t outside_lens = 0;
-  /// Not used: in a window that was mapped, but not among the events chosen there.
-  std::uint64_t over_budget = 0;
-
-  EventCounts& operator+=(const EventCounts& other);
-};
 
 /// One camera's events from their arrival to their release: checks, filters and buffers them, and
 /// counts what becomes of each. Times are on the trajectory's clock: the camera's offset is added.
@@ -83,8 +67,8 @@ class CameraStream {
   /// Marks the window's events that have a pose as used; those of an `EvenChoice` of at most
   /// `max_events`.
   void markUsed(const Window& window, const Trajectory& trajectory, std::size_t max_events);
-  /// The windows of [t0, t1) are not mapped: their events that no other one uses count as dropped.
-  void giveUp(std::int64_t t0_ns, std::int64_t t1_ns);
+  /// Drops the windows in [t0, t1): their events that no other window uses count as dropped.
+  void dropWindows(std::int64_t t0_ns, std::int64_t t1_ns);
   /// Counts and releases the events before a time.
   void release(std::int64_t until_ns, const Trajectory& trajectory);
 
@@ -104,7 +88,7 @@ class CameraStream {
   std::optional<FilteredEvents> filter_;
   EventBuffer buffer_;
   std::vector<Window> over_budget_;  // windows with events that were not chosen
-  std::vector<Window> given_up_;     // times of windows that were given up, in order
+  std::vector<Window> dropped_;      // times of windows that were dropped, in order
   std::size_t pose_cursor_ = 0;
   std::optional<std::int64_t> newest_ns_;
   std::int64_t covered_ns_ = kMinTimeNs;

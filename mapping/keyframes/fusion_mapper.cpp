@@ -51,17 +51,6 @@ EventCounts MapperCounts::total() const {
   return sum;
 }
 
-std::uint64_t WindowsGivenUp::total() const {
-  return std::accumulate(
-      std::begin(kGiveUpReasons), std::end(kGiveUpReasons), std::uint64_t{0},
-      [this](std::uint64_t sum, const NamedReason& reason) { return sum + this->*reason.count; });
-}
-
-WindowsGivenUp& WindowsGivenUp::operator+=(const WindowsGivenUp& other) {
-  for (const NamedReason& reason : kGiveUpReasons) this->*reason.count += other.*reason.count;
-  return *this;
-}
-
 MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
   cameras.resize(std::max(cameras.size(), other.cameras.size()));
   for (std::size_t i = 0; i < other.cameras.size(); ++i) cameras[i] += other.cameras[i];
@@ -70,7 +59,7 @@ MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
   keyframes += other.keyframes;
   keyframes_without_pose += other.keyframes_without_pose;
   windows_without_events += other.windows_without_events;
-  windows_given_up += other.windows_given_up;
+  dropped_windows += other.dropped_windows;
   silent_subintervals += other.silent_subintervals;
   sorted_events += other.sorted_events;
   late_events += other.late_events;
@@ -133,7 +122,7 @@ void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
 
 void FusionMapper::coverAllUntil(std::int64_t t_ns) {
   for (CameraStream& camera : cameras_) camera.coverUntil(t_ns - camera.onTrajectoryClock(0));
-  if (!start_ns_) giveUpBefore(t_ns, &WindowsGivenUp::no_pose);
+  if (!start_ns_) dropWindowsBefore(t_ns, DropReason::kNoPose);
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
@@ -179,26 +168,26 @@ void FusionMapper::skipWindow(const Window& window) {
   releaseBefore(releasableUntil());
 }
 
-void FusionMapper::giveUpWindow(const Window& window, GiveUpReason reason) {
-  ++(counts_.windows_given_up.*reason);
+void FusionMapper::dropWindow(const Window& window, DropReason reason) {
+  ++counts_.dropped_windows[reason];
   policy_->advance(window, nullptr);
   loseEvents(window.t0_ns, policy_->earliestStart(*this), reason);
   releaseBefore(releasableUntil());
 }
 
-bool FusionMapper::giveUpFailed() {
+bool FusionMapper::dropFailedWindow() {
   if (!failed_) return false;
-  giveUpWindow(*std::exchange(failed_, std::nullopt), &WindowsGivenUp::error);
+  dropWindow(*std::exchange(failed_, std::nullopt), DropReason::kError);
   return true;
 }
 
-void FusionMapper::giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {
+void FusionMapper::dropWindowsBefore(std::int64_t t_ns, DropReason reason) {
   for (CameraStream& camera : cameras_) camera.filterUntil(t_ns);
   std::int64_t from_ns = kMinTimeNs;
   std::int64_t until_ns = t_ns;
   if (start_ns_) {
     from_ns = policy_->earliestStart(*this);
-    counts_.windows_given_up.*reason += policy_->giveUpBefore(*this, t_ns);
+    counts_.dropped_windows[reason] += policy_->dropWindowsBefore(*this, t_ns);
     until_ns = policy_->earliestStart(*this);
   }
   loseEvents(from_ns, until_ns, reason);
@@ -206,14 +195,14 @@ void FusionMapper::giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {
 }
 
 /// The windows of [t0, t1) are given up.
-void FusionMapper::loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, GiveUpReason reason) {
-  if (reason == &WindowsGivenUp::paused) return;  // the host does not want them
-  for (CameraStream& camera : cameras_) camera.giveUp(t0_ns, t1_ns);
+void FusionMapper::loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason) {
+  if (reason == DropReason::kPaused) return;  // the host does not want them
+  for (CameraStream& camera : cameras_) camera.dropWindows(t0_ns, t1_ns);
 }
 
 void FusionMapper::loseKeyframe() {
   --counts_.keyframes;
-  ++counts_.windows_given_up.error;
+  ++counts_.dropped_windows[DropReason::kError];
 }
 
 std::size_t FusionMapper::heldEvents() const {
@@ -243,11 +232,12 @@ void FusionMapper::configure(const KeyframePolicyOptions& policy,
   if (options_.only_window) return;
   policy_ = makeKeyframePolicy(policy, depthGuess(planes));
   if (!start_ns_ || released_ns_ <= *start_ns_) return;
-  const std::uint64_t given_up = policy_->giveUpBefore(*this, released_ns_);
-  WindowsGivenUp& counts = counts_.windows_given_up;
-  if (counts.no_scene > 0 && counts_.keyframes == 0) {  // counted as those of the new policy
-    const std::uint64_t others = counts.total() - counts.no_scene;
-    counts.no_scene = given_up - std::min(given_up, others);
+  const std::uint64_t dropped = policy_->dropWindowsBefore(*this, released_ns_);
+  const std::uint64_t all = counts_.dropped_windows.total();
+  std::uint64_t& no_scene = counts_.dropped_windows[DropReason::kNoScene];
+  if (no_scene > 0 && counts_.keyframes == 0) {  // counted as windows of the new policy
+    const std::uint64_t others = all - no_scene;
+    no_scene = dropped - std::min(dropped, others);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/events/event.h"
+#include "mapping/events/event_fate.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/lens.h"
@@ -43,37 +45,34 @@ struct FusionMapperOptions {
   void validate() const;
 };
 
-/// Windows that were given up, by reason.
-struct WindowsGivenUp {
-  std::uint64_t overload = 0;     ///< Too much input waited, or input was dropped.
-  std::uint64_t too_large = 0;    ///< They have more events than the queue of live operation holds.
-  std::uint64_t jump = 0;         ///< The tracker jumped within them.
-  std::uint64_t no_pose = 0;      ///< Their poses did not come in time.
-  std::uint64_t no_scene = 0;     ///< They showed no scene to choose automatic options from.
-  std::uint64_t error = 0;        ///< They could not be mapped.
-  std::uint64_t paused = 0;       ///< Map updating was disabled.
-  std::uint64_t clock_reset = 0;  ///< They waited when a clock went back.
+/// Why a window was dropped.
+enum class DropReason {
+  kOverload,    ///< Too much input waited, or input was dropped.
+  kTooLarge,    ///< It has more events than the queue of live operation holds.
+  kJump,        ///< The tracker jumped within it.
+  kNoPose,      ///< Its poses did not come in time.
+  kNoScene,     ///< It showed no scene to choose automatic options from.
+  kError,       ///< It could not be mapped.
+  kPaused,      ///< Map updating was disabled.
+  kClockReset,  ///< It waited when a clock went back.
+};
 
-  std::uint64_t total() const;
-  WindowsGivenUp& operator+=(const WindowsGivenUp& other);
+struct DropReasonRow {
+  DropReason reason;
+  const char* key;   ///< In report.json.
+  const char* text;  ///< What follows "3 windows".
 };
-using GiveUpReason = std::uint64_t WindowsGivenUp::*;
-
-struct NamedReason {
-  GiveUpReason count;
-  const char* name;
-  const char* text;  ///< What follows "3 windows were given up".
+inline constexpr DropReasonRow kDropReasons[] = {
+    {DropReason::kOverload, "overload", "for overload"},
+    {DropReason::kTooLarge, "too_large", "larger than the queue"},
+    {DropReason::kJump, "jump", "across a jump of the tracker"},
+    {DropReason::kNoPose, "no_pose", "without poses"},
+    {DropReason::kNoScene, "no_scene", "without a scene"},
+    {DropReason::kError, "error", "for errors"},
+    {DropReason::kPaused, "paused", "while map updating was disabled"},
+    {DropReason::kClockReset, "clock_reset", "at a clock reset"},
 };
-inline constexpr NamedReason kGiveUpReasons[] = {
-    {&WindowsGivenUp::overload, "overload", "for overload"},
-    {&WindowsGivenUp::too_large, "too_large", "larger than the queue"},
-    {&WindowsGivenUp::jump, "jump", "across a jump of the tracker"},
-    {&WindowsGivenUp::no_pose, "no_pose", "without poses"},
-    {&WindowsGivenUp::no_scene, "no_scene", "without a scene"},
-    {&WindowsGivenUp::error, "error", "for errors"},
-    {&WindowsGivenUp::paused, "paused", "while map updating was disabled"},
-    {&WindowsGivenUp::clock_reset, "clock_reset", "at a clock reset"},
-};
+using DroppedWindows = CountsBy<DropReason, std::size(kDropReasons)>;
 
 struct MapperCounts {
   std::vector<EventCounts> cameras;
@@ -82,7 +81,7 @@ struct MapperCounts {
   std::uint64_t keyframes = 0;
   std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
   std::uint64_t windows_without_events = 0;  ///< Skipped: no selected camera has events.
-  WindowsGivenUp windows_given_up;           ///< See `FusionMapper::giveUpWindow`, `giveUpBefore`.
+  DroppedWindows dropped_windows;            ///< By `dropWindow` and `dropWindowsBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
   std::uint64_t late_events = 0;             ///< See `FusionMapper::dropLate`.
@@ -153,16 +152,16 @@ class FusionMapper : private RecordingProgress {
   /// Goes on to the next window without mapping this one.
   void skipWindow(const Window& window);
   /// The same; the window counts as given up.
-  void giveUpWindow(const Window& window, GiveUpReason reason);
+  void dropWindow(const Window& window, DropReason reason);
   /// After `next` has thrown: gives up the window that it was mapping, for an error.
   /// @return whether there was one. Otherwise the next call of `next` tries the same again.
-  bool giveUpFailed();
+  bool dropFailedWindow();
   /// Gives up the windows that begin before a time, with or without data, and releases the events
   /// before it. Such an event that comes later is counted as dropped, and so is each event of these
   /// windows that no other one uses, unless the reason is `paused`.
-  void giveUpBefore(std::int64_t t_ns, GiveUpReason reason);
+  void dropWindowsBefore(std::int64_t t_ns, DropReason reason);
   /// The same for all events so far.
-  void giveUpAll(GiveUpReason reason) { giveUpBefore(reachedNs() + 1, reason); }
+  void dropAllWindows(DropReason reason) { dropWindowsBefore(reachedNs() + 1, reason); }
   /// The newest keyframe is not kept: its window counts as given up for an error.
   void loseKeyframe();
   /// All events that were added, of all cameras: the sum of `EventCounts::read`.
@@ -191,7 +190,7 @@ class FusionMapper : private RecordingProgress {
   std::optional<Window> coveredWindow();
   std::optional<Window> lastWindow();
   std::vector<EventSpan> eventsOf(const Window& window) const;
-  void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, GiveUpReason reason);
+  void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason);
   void releaseUnneeded();
   bool isCovered(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);

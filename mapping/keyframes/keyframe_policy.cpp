@@ -55,7 +55,7 @@ class PeriodPolicy : public KeyframePolicy {
     if (since_first_end_ns < 0) return 0;
     return moveTo(since_first_end_ns / stride_ns_ + 1);
   }
-  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
+  std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
     const std::int64_t since_start_ns = t_ns - recording.startNs();
     return since_start_ns <= 0 ? 0 : moveTo((since_start_ns - 1) / stride_ns_ + 1);
   }
@@ -106,7 +106,7 @@ class EventsPolicy : public KeyframePolicy {
     counted_events_ = 0;
   }
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
-  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
+  std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
     const std::int64_t from_ns = earliestStart(recording);
     if (t_ns <= from_ns) return 0;
     counted_events_ -= recording.eventsIn(from_ns, t_ns);
@@ -149,7 +149,7 @@ class SingleWindowPolicy : public KeyframePolicy {
     window_.reset();
     return 1;
   }
-  std::uint64_t giveUpBefore(const RecordingProgress&, std::int64_t t_ns) override {
+  std::uint64_t dropWindowsBefore(const RecordingProgress&, std::int64_t t_ns) override {
     if (!window_ || window_->t0_ns >= t_ns) return 0;
     window_.reset();
     return 1;
@@ -318,7 +318,7 @@ std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) c
   return next_ns_.value_or(recording.startNs());
 }
 
-std::uint64_t BaselinePolicy::giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) {
+std::uint64_t BaselinePolicy::dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) {
   const std::int64_t from_ns = earliestStart(recording);
   if (t_ns <= from_ns) return 0;
   startAt(t_ns);

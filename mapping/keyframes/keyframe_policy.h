@@ -113,7 +113,7 @@ class KeyframePolicy {
   /// Gives up the windows that begin before `t_ns`. @return their number. Where the ends of windows
   /// depend on data, which may be missing, it is the number that the events before `t_ns` would
   /// have filled. A window that is given up piece by piece counts once.
-  virtual std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) = 0;
+  virtual std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) = 0;
 };
 
 /// @param depth_guess_m mean depth of the scene before the first keyframe.
@@ -147,7 +147,7 @@ class BaselinePolicy : public KeyframePolicy {
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
   /// Every window has events: none is skipped.
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
-  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override;
+  std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override;
 
  private:
   bool isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,

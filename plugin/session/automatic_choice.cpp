@@ -146,7 +146,7 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
     return false;
   }
   if (secondsBetween(window.t0_ns, window.t1_ns) < kFirstWindowS) return endPiece();
-  mapper_.giveUpBefore(window.t1_ns, &WindowsGivenUp::no_scene);
+  mapper_.dropWindowsBefore(window.t1_ns, DropReason::kNoScene);
   return true;
 }
 

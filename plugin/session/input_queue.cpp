@@ -114,7 +114,7 @@ void InputQueue::add(EventPacket packet) {
   Camera& camera = cameraOf(packet.camera);
   camera.counts.received += packet.events.size();
   if (ended_) {
-    camera.counts.after_end += packet.events.size();
+    camera.counts.fates[EventFate::kAfterEnd] += packet.events.size();
     return;
   }
   try {
@@ -128,7 +128,7 @@ void InputQueue::add(EventPacket packet) {
                       packet.camera));
     }
   } catch (const std::invalid_argument&) {
-    camera.counts.refused += packet.events.size();
+    camera.counts.fates[EventFate::kRefused] += packet.events.size();
     throw;
   }
   takeAhead(camera, packet);
@@ -150,7 +150,7 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
   const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
   if (confirms || !events.empty()) {  // a cover alone refuses nothing
-    if (auto waited = stream.settle(confirms, camera.counts.refused)) {
+    if (auto waited = stream.settle(confirms, camera.counts.fates[EventFate::kRefused])) {
       pass(camera, std::move(*waited));
     }
   }
@@ -167,7 +167,7 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
         continue;
       }
       if (isFarAfter(event.t_ns, events[i + 1].t_ns)) {
-        ++camera.counts.refused;
+        ++camera.counts.fates[EventFate::kRefused];
         continue;
       }
     }
@@ -195,7 +195,7 @@ void InputQueue::dropOldest() {
   const EventPacket& oldest = packets_.front();
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
-  cameraOf(oldest.camera).counts.dropped += oldest.events.size();
+  cameraOf(oldest.camera).counts.fates[EventFate::kQueueFull] += oldest.events.size();
   if (!oldest.events.empty() || oldest.skipped_until_ns) {
     const std::int64_t until_ns =
         oldest.skipped_until_ns ? *oldest.skipped_until_ns : oldest.events.back().t_ns + 1;
@@ -215,7 +215,7 @@ void InputQueue::skip(const EventPacket& packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
   QueueCounts& counts = cameraOf(packet.camera).counts;
   counts.received += packet.events.size();
-  counts.paused += packet.events.size();
+  counts.fates[EventFate::kPaused] += packet.events.size();
   if (!ended_ && !packet.events.empty()) push(skippedPacket(packet));
 }
 
@@ -245,7 +245,7 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
-    if (auto last = camera.stream.settleLast(camera.counts.refused)) {
+    if (auto last = camera.stream.settleLast(camera.counts.fates[EventFate::kRefused])) {
       pass(camera, std::move(*last));
     }
     if (!camera.last) continue;
@@ -317,10 +317,10 @@ std::map<int, QueueCounts> InputQueue::counts() const {
   for (const auto& [index, camera] : cameras_) {
     QueueCounts& of_camera = counts[index];
     of_camera = camera.counts;
-    of_camera.thinned = camera.budget.thinned();
+    of_camera.fates[EventFate::kThinned] = camera.budget.thinned();
     of_camera.held = camera.budget.held() + (camera.stream.ahead ? 1 : 0);
-    of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
-                       of_camera.paused - of_camera.refused - of_camera.after_end - of_camera.taken;
+    of_camera.queued =
+        of_camera.received - of_camera.held - of_camera.taken - of_camera.fates.total();
   }
   return counts;
 }

@@ -117,7 +117,7 @@ std::optional<std::int64_t> LiveGuard::missingUntil(const FusionMapper& mapper, 
 void LiveGuard::dropMissing(FusionMapper& mapper, int camera, std::int64_t next_ns) {
   const std::optional<std::int64_t> until_ns = missingUntil(mapper, camera);
   if (!until_ns) return;
-  mapper.giveUpBefore(std::min(*until_ns, next_ns), missing_.at(camera).reason);
+  mapper.dropWindowsBefore(std::min(*until_ns, next_ns), missing_.at(camera).reason);
   missing_.erase(camera);
 }
 
@@ -161,7 +161,7 @@ std::optional<std::int64_t> LiveGuard::limitWaits(FusionMapper& mapper,
   if (!events) return needed_ns;
   const std::int64_t overdue_ns = events->last_ns - durationFromSeconds(options_.max_pose_wait_s);
   if (!newest_ns || *newest_ns < overdue_ns) {
-    mapper.giveUpBefore(overdue_ns, &WindowsGivenUp::no_pose);
+    mapper.dropWindowsBefore(overdue_ns, DropReason::kNoPose);
   }
   return needed_ns;
 }
@@ -180,7 +180,7 @@ std::optional<LiveStatus> LiveGuard::status(const std::map<int, std::uint64_t>& 
   for (std::size_t c = 0; c < counts.cameras.size(); ++c) {
     const auto camera = static_cast<int>(c);
     if (!isSelected(camera, selected)) continue;
-    status.cameras[camera].lost += counts.cameras[c].dropped + counts.cameras[c].without_pose;
+    status.cameras[camera].lost += counts.cameras[c].fates.losses();
   }
   return status;
 }

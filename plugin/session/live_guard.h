@@ -20,7 +20,7 @@ namespace efm {
 /// Events of a camera that are missing, until a time on its clock, and why.
 struct MissingEvents {
   std::int64_t until_ns = std::numeric_limits<std::int64_t>::min();
-  GiveUpReason reason = &WindowsGivenUp::overload;
+  DropReason reason = DropReason::kOverload;
 };
 
 /// A pose of the rig, and the standard deviations that its tracker states.

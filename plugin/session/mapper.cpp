@@ -198,7 +198,7 @@ void Mapper::feed(Batch batch, std::exception_ptr& error) {
     for (EventPacket& packet : batch.packets) {
       attempt(of_input, Fault::kEvents, "", [&] {
         if (packet.skipped_until_ns) {
-          session_.noteMissing(packet.camera, {*packet.skipped_until_ns, &WindowsGivenUp::paused});
+          session_.noteMissing(packet.camera, {*packet.skipped_until_ns, DropReason::kPaused});
         } else {
           session_.addEvents(std::move(packet));
         }
@@ -244,7 +244,7 @@ bool Mapper::mapNext(std::exception_ptr& error) {
       map_so_far_.trajectory.resize(kept);
       map_so_far_.tracker_trajectory.resize(std::min(map_so_far_.tracker_trajectory.size(), kept));
       map_so_far_.keyframes.resize(std::min(map_so_far_.keyframes.size(), kept_keyframes));
-      goes_on = queue_ && session_.giveUpFailed();
+      goes_on = queue_ && session_.dropFailedWindow();
     }
     if (keyframe) {
       goes_on = true;
@@ -502,18 +502,20 @@ void Mapper::warnOfLosses() {
   std::string text;
   const SessionStatus status = this->status();
   for (const auto& [camera, counts] : status.live->cameras) {
-    losses += counts.dropped + counts.thinned + counts.refused + counts.lost;
-    text += fmt::format(
-        "; camera {}: {} dropped, {} thinned, {} refused, {} lost afterwards, of {} events", camera,
-        counts.dropped, counts.thinned, counts.refused, counts.lost, counts.received);
+    losses += counts.losses();
+    text += fmt::format("; camera {}: ", camera);
+    for (const EventFate fate : {EventFate::kQueueFull, EventFate::kThinned, EventFate::kRefused}) {
+      text += fmt::format("{} {}, ", counts.fates[fate], rowOf(fate).text);
+    }
+    text += fmt::format("{} lost afterwards, of {} events", counts.lost, counts.received);
   }
-  const WindowsGivenUp& given_up = status.counts.windows_given_up;
-  if (losses == warned_losses_ && given_up.total() == warned_given_up_) return;
+  const DroppedWindows& dropped = status.counts.dropped_windows;
+  if (losses == warned_losses_ && dropped.total() == warned_dropped_windows_) return;
   warned_ = now;
   warned_losses_ = losses;
-  warned_given_up_ = given_up.total();
+  warned_dropped_windows_ = dropped.total();
   std::exception_ptr ignored;
-  warn(fmt::format("so far {}{}", asText(given_up), text), ignored);
+  warn(fmt::format("so far {}{}", asText(dropped), text), ignored);
 }
 
 }  // namespace efm

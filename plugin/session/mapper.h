@@ -175,7 +175,7 @@ class Mapper {
   Clock::time_point rejection_logged_;
   std::set<std::string> logged_callbacks_;  // that threw
   std::uint64_t warned_losses_ = 0;
-  std::uint64_t warned_given_up_ = 0;
+  std::uint64_t warned_dropped_windows_ = 0;
   std::uint64_t warned_failures_ = 0;
   std::shared_ptr<Mapper> self_;  // of `make`, until the thread ends: its owner may be gone
 

@@ -182,7 +182,7 @@ void MappingSession::useSelected() {
 void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
   constexpr double kEnoughS = 0.2;
   first_look_ends_ = true;
-  if (missing.reason == &WindowsGivenUp::overload) chooseFromSoFar(kEnoughS);
+  if (missing.reason == DropReason::kOverload) chooseFromSoFar(kEnoughS);
   if (guard_.clockWentBack()) {
     guard_.hold([=] { guard_.noteMissing(camera, missing); });
     return;
@@ -202,7 +202,7 @@ bool MappingSession::segmentEnds() const {
 bool MappingSession::beginSegment() {
   if (!segmentEnds()) return false;
   const std::int64_t begin_ns = guard_.afterJumpNs();
-  mapper_.giveUpBefore(begin_ns, &WindowsGivenUp::jump);
+  mapper_.dropWindowsBefore(begin_ns, DropReason::kJump);
   fitIntoSegments(begin_ns);
   useWaiting(guard_.beginSegment());
   finishMapper();  // `finish` could not do it while poses were held
@@ -229,7 +229,7 @@ void MappingSession::restartMapper() {
   FusionMapper fresh(mapperOptions(options_));  // complete before it is used: memory may fail
   for (const RigCamera& rig_camera : mapper_.rig().cameras) fresh.addCamera(rig_camera);
   if (depth_follower_) fresh.setPlanes(depth_follower_->planes());
-  mapper_.giveUpAll(&WindowsGivenUp::clock_reset);
+  mapper_.dropAllWindows(DropReason::kClockReset);
   earlier_counts_ += mapper_.counts();
   mapper_ = std::move(fresh);
   rig_.beginClock();
@@ -300,7 +300,7 @@ bool MappingSession::dropOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
   if (mapper_.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
-  mapper_.giveUpWindow(*oldest, &WindowsGivenUp::overload);
+  mapper_.dropWindow(*oldest, DropReason::kOverload);
   return true;
 }
 
@@ -319,8 +319,8 @@ void MappingSession::dropOlderHalf() {
       rig_.isComplete() && !options_.automatic.any() && needed > queue_events &&
       static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
   if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
-  mapper_.giveUpBefore(oldest_ns + held_ns / 2 + 1,
-                       too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
+  mapper_.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
+                       too_large ? DropReason::kTooLarge : DropReason::kOverload);
   constexpr double kNews = 1.2;  // one that is that much larger is reported again
   if (!too_large || needed < kNews * reported_needed_) return;
   reported_needed_ = needed;
@@ -339,8 +339,8 @@ void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
   cloud_.insertFixed(points, T_world_ref);
 }
 
-bool MappingSession::giveUpFailed() {
-  return std::exchange(keyframe_lost_, false) || mapper_.giveUpFailed();
+bool MappingSession::dropFailedWindow() {
+  return std::exchange(keyframe_lost_, false) || mapper_.dropFailedWindow();
 }
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,

@@ -85,7 +85,7 @@ class MappingSession {
   void limitHeld(double max_events);
   /// After `next` has thrown: drops the window that it was mapping.
   /// @return true if a window was dropped; false if the error did not belong to a window.
-  bool giveUpFailed();
+  bool dropFailedWindow();
 
   /// Moves all keyframes in the cloud to their refined poses.
   void applyPending();

@@ -48,13 +48,13 @@ std::string durationText(double seconds) {
   return fmt::format("{:02}:{:02} h", whole / 3600, whole / 60 % 60);
 }
 
-std::string asText(const WindowsGivenUp& windows) {
+std::string asText(const DroppedWindows& windows) {
   std::string text = fmt::format("{} windows given up", windows.total());
   const char* separator = ": ";
-  for (const NamedReason& reason : kGiveUpReasons) {
-    const std::uint64_t count = windows.*reason.count;
+  for (const DropReasonRow& row : kDropReasons) {
+    const std::uint64_t count = windows[row.reason];
     if (count == 0) continue;
-    text += fmt::format("{}{} {}", separator, count, reason.text);
+    text += fmt::format("{}{} {}", separator, count, row.text);
     separator = ", ";
   }
   return text;
@@ -65,7 +65,7 @@ double LiveStatus::dropRatio() const {
   std::uint64_t missing = 0;
   for (const auto& [index, camera] : cameras) {
     received += camera.received;
-    missing += camera.thinned + camera.dropped + camera.refused + camera.after_end + camera.lost;
+    missing += camera.losses();
   }
   return received == 0 ? 0 : static_cast<double>(missing) / static_cast<double>(received);
 }

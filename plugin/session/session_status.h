@@ -135,26 +135,23 @@ inline void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   span->last_ns = std::max(span->last_ns, t_ns);
 }
 
-/// What became of one camera's events before the mapping, in live operation:
-/// received = thinned + held + queued + dropped + paused + refused + after_end + taken.
+/// One camera's events before the mapping, in live operation:
+/// received = held + queued + taken + the sum of the fates.
 struct QueueCounts {
   std::uint64_t received = 0;
-  std::uint64_t thinned = 0;  ///< By the budget in sensor time.
-  std::uint64_t held = 0;     ///< Until the end of their 10 ms, or the next event confirms them.
+  std::uint64_t held = 0;  ///< Until the end of their 10 ms, or the next event confirms them.
   std::uint64_t queued = 0;
-  std::uint64_t dropped = 0;  ///< The queue was full.
-  std::uint64_t paused = 0;   ///< Map updating was disabled.
-  /// In a packet that contradicts its camera, or over a second ahead of those before and after.
-  std::uint64_t refused = 0;
-  std::uint64_t after_end = 0;  ///< Came after the end.
-  std::uint64_t taken = 0;      ///< By the mapping: `EventCounts::read`, or `refused_events`.
-  /// Of those taken: refused, dropped or without a pose. Not counted for a camera that takes no
-  /// part.
+  std::uint64_t taken = 0;  ///< By the mapping: `EventCounts::read`, or `refused_events`.
+  /// Of `taken`: rejected, or lost by their fate. Not counted for a camera that takes no part.
   std::uint64_t lost = 0;
+  EventFates fates;  ///< Of the queue.
+
+  /// The events that are lost in the queue or in the mapping.
+  std::uint64_t losses() const { return fates.losses() + lost; }
 };
 
 /// "3 windows given up: 2 for overload, 1 without poses".
-std::string asText(const WindowsGivenUp& windows);
+std::string asText(const DroppedWindows& windows);
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
@@ -168,9 +165,7 @@ struct LiveStatus {
   std::string too_large;     ///< Why the queue holds no window; empty: it does.
   bool failing = false;      ///< The last keyframe could not be made.
 
-  /// The part of the received events that is lost, 0 to 1: thinned, dropped, refused, after the
-  /// end, without a pose, or in windows that were given up. Events that the options leave out, and
-  /// those that came while map updating was disabled, are not lost.
+  /// The part of the received events that is lost (`EventFateRow::is_loss`), 0 to 1.
   double dropRatio() const;
 };
 

@@ -63,18 +63,21 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
   }
   if (status.live && !status.live->too_large.empty()) return status.live->too_large;
   const EventCounts counts = status.counts.total();
-  if (counts.filtered > 0 && counts.used == 0 && counts.filtered + counts.dropped == counts.read) {
+  if (counts[EventFate::kFiltered] > 0 && counts[EventFate::kUsed] == 0 &&
+      counts[EventFate::kFiltered] + counts[EventFate::kDropped] == counts.read) {
     return fmt::format(
         "the filters took all {} events of the selected cameras for noise: [filter] is too strict "
         "for this recording",
-        counts.filtered);
+        counts[EventFate::kFiltered]);
   }
-  if (counts.outside_lens > 0 && counts.used == 0 &&
-      counts.outside_lens + counts.filtered + counts.dropped == counts.read) {
+  if (counts[EventFate::kOutsideLens] > 0 && counts[EventFate::kUsed] == 0 &&
+      counts[EventFate::kOutsideLens] + counts[EventFate::kFiltered] +
+              counts[EventFate::kDropped] ==
+          counts.read) {
     return fmt::format(
         "{} of {} events lie outside the lens: its model has no viewing ray for their pixels, so "
         "the calibration is wrong",
-        counts.outside_lens, counts.read);
+        counts[EventFate::kOutsideLens], counts.read);
   }
   const std::uint64_t without_pose = status.counts.keyframes_without_pose;
   const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
@@ -123,30 +126,31 @@ void addUnusedEvents(const SessionStatus& status, const FusionMapperOptions& opt
   }
   for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
     const EventCounts& events = status.counts.cameras[c];
-    if (events.outside_lens == 0) continue;
+    if (events[EventFate::kOutsideLens] == 0) continue;
     warnings.add("outside-lens",
                  "{} of {} events of camera {} were not used: its lens model has no viewing ray "
                  "for their pixels (outside_lens)",
-                 events.outside_lens, events.read, c);
+                 events[EventFate::kOutsideLens], events.read, c);
   }
   if (status.counts.keyframes == 0) return;  // the error says why
   const EventCounts counts = status.counts.total();
-  const std::uint64_t wanted = counts.read - counts.dropped;  // events of unselected cameras
-  if (counts.without_pose > wanted / 2) {
+  const std::uint64_t wanted =
+      counts.read - counts[EventFate::kDropped];  // events of unselected cameras
+  if (counts[EventFate::kWithoutPose] > wanted / 2) {
     warnings.add("events-without-pose",
                  "{} of {} events have no pose: poses begin late, end early or have gaps "
                  "(--poses, [rig] max_pose_gap_s)",
-                 counts.without_pose, wanted);
+                 counts[EventFate::kWithoutPose], wanted);
   }
   // With limits on time, or windows apart from each other, it is what was asked for.
   const bool gapless = options.policy.policy != KeyframePolicyKind::kPeriod ||
                        options.policy.stride_s <= options.policy.window_s;
   const bool whole = !options.only_window && !options.limits.t0_ns && !options.limits.t1_ns;
-  if (whole && gapless && counts.outside_window > wanted / 2) {
+  if (whole && gapless && counts[EventFate::kOutsideWindow] > wanted / 2) {
     warnings.add("events-outside-windows",
                  "{} of {} events lie in no window that was mapped: windows are too long for the "
                  "recording, or saw too little motion ([keyframes] window_s, min_baseline_ratio)",
-                 counts.outside_window, wanted);
+                 counts[EventFate::kOutsideWindow], wanted);
   }
 }
 
@@ -182,13 +186,13 @@ void addUnusedPoses(const SessionStatus& status, WarningList& warnings) {
 
 void addLosses(const SessionStatus& status, WarningList& warnings) {
   if (!status.live) return;
-  const WindowsGivenUp& given_up = status.counts.windows_given_up;
-  if (status.live->dropRatio() > 0 || given_up.total() > 0) {
+  const DroppedWindows& dropped = status.counts.dropped_windows;
+  if (status.live->dropRatio() > 0 || dropped.total() > 0) {
     std::uint64_t thinned = 0;
-    bool overload = given_up.overload > 0;
+    bool overload = dropped[DropReason::kOverload] > 0;
     for (const auto& [index, camera] : status.live->cameras) {
-      overload = overload || camera.dropped > 0;
-      thinned += camera.thinned;
+      overload = overload || camera.fates[EventFate::kQueueFull] > 0;
+      thinned += camera.fates[EventFate::kThinned];
     }
     std::string why;
     if (thinned > 0) {
@@ -197,7 +201,7 @@ void addLosses(const SessionStatus& status, WarningList& warnings) {
     if (overload) why += "; the machine is too slow for more ([live] max_queue_events)";
     if (!status.live->too_large.empty()) why += "; " + status.live->too_large;
     warnings.add("events-lost", "{:.1f} % of the events were lost; {}{}",
-                 100 * status.live->dropRatio(), asText(given_up), why);
+                 100 * status.live->dropRatio(), asText(dropped), why);
   }
   if (status.live->errors > 0) {
     warnings.add("mapping-errors", "{} errors while mapping, the last one: {}", status.live->errors,

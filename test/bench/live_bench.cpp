@@ -215,15 +215,16 @@ std::uint64_t hashOf(const MapCloud& cloud) {
 void printCounts(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     const EventCounts& counts = status.counts.cameras.at(static_cast<std::size_t>(camera));
-    const std::uint64_t before = queue.thinned + queue.held + queue.queued + queue.dropped +
-                                 queue.paused + queue.refused + queue.after_end;
+    const std::uint64_t before = queue.held + queue.queued + queue.fates.total();
     fmt::print(
         "camera {}: received {}, thinned {}, dropped {}, used {}, without pose {}, the sums {}\n",
-        camera, queue.received, queue.thinned, queue.dropped, counts.used, counts.without_pose,
+        camera, queue.received, queue.fates[EventFate::kThinned],
+        queue.fates[EventFate::kQueueFull], counts[EventFate::kUsed],
+        counts[EventFate::kWithoutPose],
         queue.received == before + queue.taken ? "agree" : "DIFFER");
   }
   fmt::print("{} keyframes, {}, {} jumps, {} clock resets, {} errors {}; drop ratio {:.3f}\n",
-             status.counts.keyframes, asText(status.counts.windows_given_up),
+             status.counts.keyframes, asText(status.counts.dropped_windows),
              status.live->pose_jumps, status.live->clock_steps, status.live->errors,
              status.live->last_error, status.live->dropRatio());
 }

@@ -54,14 +54,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json asJson(const EventCounts& counts) {
-  return {{"read", counts.read},
-          {"used", counts.used},
-          {"without_pose", counts.without_pose},
-          {"outside_window", counts.outside_window},
-          {"dropped", counts.dropped},
-          {"filtered", counts.filtered},
-          {"outside_lens", counts.outside_lens},
-          {"over_budget", counts.over_budget}};
+  Json json = {{"read", counts.read}};
+  for (const EventFateRow& row : kEventFates) {
+    if (!isOfQueue(row.fate)) json[row.key] = counts[row.fate];
+  }
+  return json;
 }
 
 Json asJson(const StageSeconds& seconds) {
@@ -134,29 +131,26 @@ Json asJson(const RefinementState& refinement) {
             {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
 }
 
-Json asJson(const WindowsGivenUp& windows) {
+Json asJson(const DroppedWindows& windows) {
   Json json = Json::object();
-  for (const NamedReason& reason : kGiveUpReasons) json[reason.name] = windows.*reason.count;
+  for (const DropReasonRow& row : kDropReasons) json[row.key] = windows[row.reason];
   return json;
 }
 
 Json asJson(const LiveStatus& live, const MapperCounts& counts) {
   Json cameras = Json::array();
   for (const auto& [index, camera] : live.cameras) {
-    cameras.push_back({{"camera", index},
-                       {"received", camera.received},
-                       {"thinned", camera.thinned},
-                       {"dropped", camera.dropped},
-                       {"refused", camera.refused},
-                       {"paused", camera.paused},
-                       {"after_end", camera.after_end},
-                       {"taken", camera.taken},
-                       {"lost", camera.lost}});
+    Json& of_camera = cameras.emplace_back(Json{{"camera", index}, {"received", camera.received}});
+    for (const EventFateRow& row : kEventFates) {
+      if (isOfQueue(row.fate)) of_camera[row.key] = camera.fates[row.fate];
+    }
+    of_camera["taken"] = camera.taken;
+    of_camera["lost"] = camera.lost;
   }
   return {{"drop_ratio", live.dropRatio()},
           {"cameras", cameras},
-          {"windows_given_up", counts.windows_given_up.total()},
-          {"windows_given_up_for", asJson(counts.windows_given_up)},
+          {"windows_given_up", counts.dropped_windows.total()},
+          {"windows_given_up_for", asJson(counts.dropped_windows)},
           {"late_events", counts.late_events},
           {"pose_jumps", live.pose_jumps},
           {"clock_steps", live.clock_steps},
@@ -301,19 +295,14 @@ std::string extentText(const MapExtent& extent) {
 
 /// The share of used events, and why the others were not used.
 std::string eventsText(const EventCounts& counts) {
-  const std::pair<std::uint64_t, const char*> unused[] = {
-      {counts.outside_window, "outside the keyframes' windows"},
-      {counts.without_pose, "without a pose"},
-      {counts.filtered, "filtered as noise"},
-      {counts.over_budget, "over max_events_per_camera"},
-      {counts.dropped, "too late, or of a camera that takes no part"},
-      {counts.outside_lens, "outside the lens model"}};
-  std::string text =
-      fmt::format("{} of {} used", shareText(counts.used, counts.read), countText(counts.read));
+  std::string text = fmt::format("{} of {} used", shareText(counts[EventFate::kUsed], counts.read),
+                                 countText(counts.read));
   const char* before = "; ";
-  for (const auto& [count, why] : unused) {
-    if (count == 0) continue;
-    text += before + shareText(count, counts.read) + " " + why;
+  for (const EventFate fate :
+       {EventFate::kOutsideWindow, EventFate::kWithoutPose, EventFate::kFiltered,
+        EventFate::kOverBudget, EventFate::kDropped, EventFate::kOutsideLens}) {
+    if (counts[fate] == 0) continue;
+    text += before + shareText(counts[fate], counts.read) + " " + rowOf(fate).text;
     before = ", ";
   }
   return text;

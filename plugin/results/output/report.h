@@ -93,7 +93,7 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
 /// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
 /// live in live operation (drop_ratio, per camera what became of its events before the mapping,
-/// windows_given_up and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
+/// dropped_windows and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
 /// errors and last_error), warnings (each with name and text), doubtful (why the map rests on
 /// little evidence; absent where it does not), recording (its files), perturbation (the faults of
 /// the poses, if any), chosen (the automatic options: key, value and reason), options (all of them,

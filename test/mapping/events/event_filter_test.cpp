@@ -206,12 +206,12 @@ TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {
         event.t_ns = recording.timeOf(c, event);
         return !filter.keeps(event);
       });
-      EXPECT_EQ(filtered.counts.cameras[c].filtered,
+      EXPECT_EQ(filtered.counts.cameras[c][EventFate::kFiltered],
                 static_cast<std::uint64_t>(events.end() - end));
-      EXPECT_GT(filtered.counts.cameras[c].filtered, 200U);
+      EXPECT_GT(filtered.counts.cameras[c][EventFate::kFiltered], 200U);
       events.erase(end, events.end());
     }
-    EXPECT_EQ(filtered.counts.cameras[2].filtered, 0U) << "not selected: dropped";
+    EXPECT_EQ(filtered.counts.cameras[2][EventFate::kFiltered], 0U) << "not selected: dropped";
     FusionMapperOptions unfiltered = filteredOptions();
     unfiltered.filter = {false, {}, 0};
     const Played expected = test::play(kept, unfiltered, 0);
@@ -221,8 +221,9 @@ TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {
       EXPECT_EQ(filtered.keyframes[k].events, expected.keyframes[k].events);
       EXPECT_TRUE(test::same(filtered.keyframes[k].map, expected.keyframes[k].map));
     }
-    EXPECT_EQ(filtered.counts.total().used, expected.counts.total().used);
-    EXPECT_EQ(filtered.counts.total().without_pose, expected.counts.total().without_pose);
+    EXPECT_EQ(filtered.counts.total()[EventFate::kUsed], expected.counts.total()[EventFate::kUsed]);
+    EXPECT_EQ(filtered.counts.total()[EventFate::kWithoutPose],
+              expected.counts.total()[EventFate::kWithoutPose]);
   }
 }
 
@@ -248,8 +249,9 @@ TEST(FilteredMapping, EventsUpToTenMillisecondsLateAreSortedFilteredOrNot) {
     const Played sorted = test::play(reversed, options, 7);
     EXPECT_EQ(in_order.counts.sorted_events, 0U);
     EXPECT_EQ(sorted.counts.sorted_events, 2U * 3000 * 19 / 20);
-    EXPECT_EQ(sorted.counts.total().filtered, in_order.counts.total().filtered);
-    EXPECT_EQ(sorted.counts.total().filtered > 0, filters);
+    EXPECT_EQ(sorted.counts.total()[EventFate::kFiltered],
+              in_order.counts.total()[EventFate::kFiltered]);
+    EXPECT_EQ(sorted.counts.total()[EventFate::kFiltered] > 0, filters);
     ASSERT_EQ(sorted.keyframes.size(), in_order.keyframes.size());
     for (std::size_t k = 0; k < in_order.keyframes.size(); ++k) {
       EXPECT_TRUE(test::same(sorted.keyframes[k].map, in_order.keyframes[k].map));

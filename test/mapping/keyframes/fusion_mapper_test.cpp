@@ -72,8 +72,7 @@ class Mapper : public FusionMapper {
     std::vector<KeyframeDepthMap> keyframes = takeAll();
     const MapperCounts all = counts();
     for (const EventCounts& c : all.cameras) {
-      EXPECT_EQ(c.read, c.used + c.without_pose + c.outside_window + c.dropped + c.filtered +
-                            c.outside_lens + c.over_budget);
+      EXPECT_EQ(c.read, c.fates.total());
     }
     EXPECT_EQ(all.votes.total(), all.event_uses * kPlanes);
     return keyframes;
@@ -90,8 +89,8 @@ TEST(FusionMapper, TheOnlyWindowIsMappedAtTheEndEvenIfItIsNotFull) {
   const auto keyframes = mapper.end();
   ASSERT_EQ(keyframes.size(), 1U);
   EXPECT_EQ(keyframes[0].events[0], 151U);
-  EXPECT_EQ(mapper.counts().total().without_pose, 99U);
-  EXPECT_EQ(mapper.counts().total().outside_window, 50U);
+  EXPECT_EQ(mapper.counts().total()[EventFate::kWithoutPose], 99U);
+  EXPECT_EQ(mapper.counts().total()[EventFate::kOutsideWindow], 50U);
 }
 
 TEST(FusionMapper, NoTimeOverflowsWithTheOffsetOfItsCamera) {
@@ -129,13 +128,13 @@ TEST(FusionMapper, EventsOutsideTheLensAreCountedAndReachNoFilterAndNoWindow) {
   }
   EXPECT_EQ(mapper.end().size(), 2U);
   const std::vector<EventCounts> counts = mapper.counts().cameras;
-  EXPECT_EQ(counts[0].outside_lens, 0U);
-  EXPECT_EQ(counts[0].filtered, 211U);
-  EXPECT_EQ(counts[1].outside_lens, 250U);
-  EXPECT_EQ(counts[1].used, 200U);
-  EXPECT_EQ(counts[1].filtered, 0U);
-  EXPECT_EQ(counts[2].outside_lens, 0U);
-  EXPECT_EQ(counts[2].dropped, 500U);
+  EXPECT_EQ(counts[0][EventFate::kOutsideLens], 0U);
+  EXPECT_EQ(counts[0][EventFate::kFiltered], 211U);
+  EXPECT_EQ(counts[1][EventFate::kOutsideLens], 250U);
+  EXPECT_EQ(counts[1][EventFate::kUsed], 200U);
+  EXPECT_EQ(counts[1][EventFate::kFiltered], 0U);
+  EXPECT_EQ(counts[2][EventFate::kOutsideLens], 0U);
+  EXPECT_EQ(counts[2][EventFate::kDropped], 500U);
 }
 
 TEST(FusionMapper, TheReferenceMayStandFarOutsideTheOnlyWindow) {
@@ -150,7 +149,7 @@ TEST(FusionMapper, TheReferenceMayStandFarOutsideTheOnlyWindow) {
       keyframes += mapper.takeAll().size();
     }
     EXPECT_EQ(keyframes + mapper.end().size(), 1U);
-    EXPECT_EQ(mapper.counts().total().used, 100U);
+    EXPECT_EQ(mapper.counts().total()[EventFate::kUsed], 100U);
   }
 }
 
@@ -256,9 +255,9 @@ TEST(FusionMapper, ASinglePoseMakesNoWindowExceptTheOnlyWindow) {
           0, {eventAt(at(50) - 1), eventAt(at(50)), eventAt(at(50)), eventAt(at(50) + 1)});
       ASSERT_EQ(mapper.end().size(), asked_for ? 1U : 0U);
       const EventCounts total = mapper.counts().total();
-      EXPECT_EQ(total.without_pose, 2U);
-      EXPECT_EQ(total.used, asked_for ? 2U : 0U);
-      EXPECT_EQ(total.outside_window, asked_for ? 0U : 2U);
+      EXPECT_EQ(total[EventFate::kWithoutPose], 2U);
+      EXPECT_EQ(total[EventFate::kUsed], asked_for ? 2U : 0U);
+      EXPECT_EQ(total[EventFate::kOutsideWindow], asked_for ? 0U : 2U);
     }
   }
 }
@@ -345,7 +344,7 @@ TEST(FusionMapper, TheLastWindowIsFullAndEndsWithTheRecording) {
     }
     take(mapper.end());
     ASSERT_EQ(keyframes.size(), c.keyframes) << c.what;
-    EXPECT_EQ(mapper.counts().total().used, c.used) << c.what;
+    EXPECT_EQ(mapper.counts().total()[EventFate::kUsed], c.used) << c.what;
     if (keyframes.empty()) continue;
     const Window last = keyframes.back().window;
     const auto length_ms = static_cast<int>(1e3 * c.window_s);
@@ -367,56 +366,47 @@ TEST(FusionMapper, TheLastWindowReachesNotIntoEventsThatWereGivenUp) {
     mapper.addPoses(0, 400);
     mapper.addSteady(0, 0, 280);
     ASSERT_TRUE(mapper.nextWindow());
-    mapper.giveUpBefore(at(until_ms), &WindowsGivenUp::overload);
+    mapper.dropWindowsBefore(at(until_ms), DropReason::kOverload);
     EXPECT_EQ(mapper.end().size(), keyframes) << until_ms;
   }
 }
 
 /// All numbers in their order.
 std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
-  const EventCounts& c = counts.cameras.at(0);
-  const WindowsGivenUp& w = counts.windows_given_up;
-  return {c.read,
-          c.used,
-          c.without_pose,
-          c.outside_window,
-          c.dropped,
-          c.filtered,
-          c.outside_lens,
-          c.over_budget,
-          counts.event_uses,
-          counts.votes.cast,
-          counts.votes.outside_view,
-          counts.votes.behind_camera,
-          counts.keyframes,
-          counts.keyframes_without_pose,
-          counts.windows_without_events,
-          w.overload,
-          w.too_large,
-          w.jump,
-          w.no_pose,
-          w.no_scene,
-          w.error,
-          w.paused,
-          w.clock_reset,
-          counts.silent_subintervals,
-          counts.sorted_events,
-          counts.late_events,
-          counts.duplicate_poses};
+  std::vector<std::uint64_t> numbers = {counts.cameras.at(0).read};
+  const auto& fates = counts.cameras.at(0).fates.counts;
+  const auto& dropped = counts.dropped_windows.counts;
+  numbers.insert(numbers.end(), fates.begin(), fates.end());
+  numbers.insert(numbers.end(), {counts.event_uses, counts.votes.cast, counts.votes.outside_view,
+                                 counts.votes.behind_camera, counts.keyframes,
+                                 counts.keyframes_without_pose, counts.windows_without_events});
+  numbers.insert(numbers.end(), dropped.begin(), dropped.end());
+  numbers.insert(numbers.end(), {counts.silent_subintervals, counts.sorted_events,
+                                 counts.late_events, counts.duplicate_poses});
+  return numbers;
 }
 
 TEST(MapperCounts, AddUpNumberByNumber) {
-  const MapperCounts counts{{{1, 2, 3, 4, 5, 6, 7, 8}},       9,  {10, 11, 12}, 13, 14, 15,
-                            {16, 17, 18, 19, 20, 21, 22, 23}, 24, 25,           26, 27};
+  const MapperCounts counts{{{1, {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13}}},
+                            14,
+                            {15, 16, 17},
+                            18,
+                            19,
+                            20,
+                            {21, 22, 23, 24, 25, 26, 27, 28},
+                            29,
+                            30,
+                            31,
+                            32};
   MapperCounts sum = counts;
   sum += counts;
   const std::vector<std::uint64_t> numbers = numbersOf(sum);
-  ASSERT_EQ(numbers.size(), 27U);
+  ASSERT_EQ(numbers.size(), 32U);
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], 2 * (i + 1));
-  EXPECT_EQ(counts.windows_given_up.total(), 16U + 17 + 18 + 19 + 20 + 21 + 22 + 23);
+  EXPECT_EQ(counts.dropped_windows.total(), 21U + 22 + 23 + 24 + 25 + 26 + 27 + 28);
   sum.cameras.resize(2);
   sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, 0};
-  EXPECT_EQ(sum.total().over_budget, 17U);
+  EXPECT_EQ(sum.total()[EventFate::kOverBudget], 17U);
   EXPECT_EQ(sum.total().read, 3U);
 }
 

@@ -87,16 +87,16 @@ TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
     options.policy = kind;
     const auto policy = makeKeyframePolicy(options, kDepthGuess_m);
     std::uint64_t windows = 0;
-    for (int ms = 0; ms <= 1000; ms += 7) windows += policy->giveUpBefore(recording, ms * kMs);
+    for (int ms = 0; ms <= 1000; ms += 7) windows += policy->dropWindowsBefore(recording, ms * kMs);
     EXPECT_EQ(windows, 10U) << nameOf(kind);  // until 994 ms
-    EXPECT_EQ(policy->giveUpBefore(recording, 500 * kMs), 0U) << "not twice";
-    EXPECT_EQ(policy->giveUpBefore(recording, 1001 * kMs), 1U) << nameOf(kind);
-    EXPECT_EQ(policy->giveUpBefore(recording, 1501 * kMs), 5U) << nameOf(kind);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 500 * kMs), 0U) << "not twice";
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 1001 * kMs), 1U) << nameOf(kind);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 1501 * kMs), 5U) << nameOf(kind);
     policy->advance({1501 * kMs, 1601 * kMs, 1501 * kMs}, nullptr);
-    EXPECT_EQ(policy->giveUpBefore(recording, 1701 * kMs), 1U) << nameOf(kind);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 1701 * kMs), 1U) << nameOf(kind);
     if (kind == KeyframePolicyKind::kPeriod) continue;  // its windows do not depend on events
-    policy->giveUpBefore(recording, 2000 * kMs);
-    EXPECT_EQ(policy->giveUpBefore(recording, 9000 * kMs), 0U) << "there is no event";
+    policy->dropWindowsBefore(recording, 2000 * kMs);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 9000 * kMs), 0U) << "there is no event";
   }
 }
 
@@ -111,18 +111,18 @@ TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrGivenUp) {
     EXPECT_EQ(policy->earliestLast(recording), 10);
     EXPECT_EQ(policy->earliestReference(recording), std::min<std::int64_t>(10, t_ref_ns));
     EXPECT_EQ(policy->advancePast(recording, 19), 0U);
-    EXPECT_EQ(policy->giveUpBefore(recording, 10), 0U);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 10), 0U);
     EXPECT_FALSE(policy->last(recording, 20));
     policy->advance(window, nullptr);
     EXPECT_FALSE(policy->current(recording));
     EXPECT_EQ(policy->earliestStart(recording), kMaxTimeNs);
     EXPECT_EQ(policy->earliestReference(recording), kMaxTimeNs);
-    EXPECT_EQ(policy->advancePast(recording, 99) + policy->giveUpBefore(recording, 99), 0U);
+    EXPECT_EQ(policy->advancePast(recording, 99) + policy->dropWindowsBefore(recording, 99), 0U);
     policy = fresh();
     EXPECT_EQ(policy->advancePast(recording, 20), 1U);
     EXPECT_FALSE(policy->current(recording));
     policy = fresh();
-    EXPECT_EQ(policy->giveUpBefore(recording, 11), 1U);
+    EXPECT_EQ(policy->dropWindowsBefore(recording, 11), 1U);
     EXPECT_FALSE(policy->current(recording));
   }
 }

@@ -50,11 +50,6 @@ std::string labelOf(const FusionMapperOptions& options, std::uint32_t seed) {
   return std::string(nameOf(options.policy.policy)) + ", seed " + std::to_string(seed);
 }
 
-std::array<std::uint64_t, 8> numbersOf(const EventCounts& c) {
-  return {c.read,    c.used,     c.without_pose, c.outside_window,
-          c.dropped, c.filtered, c.outside_lens, c.over_budget};
-}
-
 /// Plays the recording as a whole and in three other ways. @return the number of keyframes.
 std::size_t expectTheSameHoweverCut(const LongRecording& recording,
                                     const FusionMapperOptions& options, const std::string& label) {
@@ -72,7 +67,7 @@ std::size_t expectTheSameHoweverCut(const LongRecording& recording,
       EXPECT_TRUE(same(a.map, b.map)) << label;
     }
     for (std::size_t c = 0; c < 3; ++c) {
-      EXPECT_EQ(numbersOf(cut_up.counts.cameras[c]), numbersOf(whole.counts.cameras[c])) << label;
+      EXPECT_EQ(cut_up.counts.cameras[c], whole.counts.cameras[c]) << label;
     }
     EXPECT_EQ(cut_up.counts.keyframes_without_pose, whole.counts.keyframes_without_pose) << label;
     EXPECT_EQ(cut_up.counts.windows_without_events, whole.counts.windows_without_events) << label;
@@ -160,30 +155,29 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
           const bool has_pose = trajectory.poseAt(t_ns).has_value();
           ++expected.read;
           if (c == 2) {
-            ++expected.dropped;
+            ++expected[EventFate::kDropped];
           } else if (!options.limits.contain(t_ns)) {
-            ++expected.outside_window;
+            ++expected[EventFate::kOutsideWindow];
           } else if (!has_pose) {
-            ++expected.without_pose;
+            ++expected[EventFate::kWithoutPose];
           } else if (choices[i].windows == 0) {
-            ++expected.outside_window;
+            ++expected[EventFate::kOutsideWindow];
           } else if (choices[i].chosen == 0) {
-            ++expected.over_budget;
+            ++expected[EventFate::kOverBudget];
           } else {
-            ++expected.used;
+            ++expected[EventFate::kUsed];
             uses += choices[i].chosen;
           }
         }
-        EXPECT_EQ(numbersOf(played.counts.cameras[c]), numbersOf(expected))
-            << labelOf(options, seed) << ", camera " << c;
+        EXPECT_EQ(played.counts.cameras[c], expected) << labelOf(options, seed) << ", camera " << c;
       }
       EXPECT_EQ(played.counts.event_uses, uses) << labelOf(options, seed);
       EXPECT_EQ(played.counts.votes.total(), uses * 4) << "of four planes";
       EXPECT_EQ(played.counts.keyframes, played.keyframes.size());
-      used += played.counts.total().used;
-      without_pose += played.counts.total().without_pose;
-      outside += played.counts.total().outside_window;
-      over_budget += played.counts.total().over_budget;
+      used += played.counts.total()[EventFate::kUsed];
+      without_pose += played.counts.total()[EventFate::kWithoutPose];
+      outside += played.counts.total()[EventFate::kOutsideWindow];
+      over_budget += played.counts.total()[EventFate::kOverBudget];
     }
   }
   EXPECT_GT(std::min({used, without_pose, outside, over_budget}), 1000U)
@@ -355,7 +349,7 @@ TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
     EXPECT_FALSE(mapper.next());
     const EventCounts counts = mapper.counts().total();
     // Held: the longest window, a stride, the delay that events may have and the last packet.
-    EXPECT_LE(counts.read - counts.outside_window, 10U * (100 + 20 + 10 + 10));
+    EXPECT_LE(counts.read - counts[EventFate::kOutsideWindow], 10U * (100 + 20 + 10 + 10));
     EXPECT_LE(mapper.trajectory().poses().size(), 2U * (14 + 2)) << "freed by the half";
   }
   // Then the camera moves: 1 m/s and a mean depth of 8/9 m make 10 % in 89 ms.

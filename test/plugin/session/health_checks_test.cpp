@@ -511,11 +511,11 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     std::function<void(SessionStatus&, FusionMapperOptions&)> make;
     const char* expected;
   };
-  const auto unused = [](std::uint64_t EventCounts::*kind, std::uint64_t events, std::uint64_t drop,
+  const auto unused = [](EventFate kind, std::uint64_t events, std::uint64_t drop,
                          const std::function<void(FusionMapperOptions&)>& change = {}) {
     return [=](SessionStatus& status, FusionMapperOptions& options) {
-      status.counts.cameras[0].*kind = events;
-      status.counts.cameras[1].dropped = drop;
+      status.counts.cameras[0][kind] = events;
+      status.counts.cameras[1][EventFate::kDropped] = drop;
       if (change) change(options);
     };
   };
@@ -533,19 +533,19 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
   };
   const Row rows[] = {
       {[](auto&, auto&) {}, ""},
-      {unused(&EventCounts::without_pose, 35, 0), ""},
-      {unused(&EventCounts::without_pose, 36, 0),
+      {unused(EventFate::kWithoutPose, 35, 0), ""},
+      {unused(EventFate::kWithoutPose, 36, 0),
        "events-without-pose: 51 of 100 events have no pose"},
-      {unused(&EventCounts::without_pose, 26, 20),
+      {unused(EventFate::kWithoutPose, 26, 20),
        "events-without-pose: 41 of 80 events have no pose"},
-      {unused(&EventCounts::outside_window, 35, 0), ""},
-      {unused(&EventCounts::outside_window, 36, 0),
+      {unused(EventFate::kOutsideWindow, 35, 0), ""},
+      {unused(EventFate::kOutsideWindow, 36, 0),
        "events-outside-windows: 51 of 100 events lie in no window that was mapped"},
-      {unused(&EventCounts::outside_window, 36, 0, [](auto& o) { o.limits.t0_ns = 5; }), ""},
-      {unused(&EventCounts::outside_window, 36, 0, [](auto& o) { o.limits.t1_ns = 5; }), ""},
-      {unused(&EventCounts::outside_window, 36, 0, [](auto& o) { o.only_window = Window{}; }), ""},
-      {unused(&EventCounts::outside_window, 36, 0, [](auto& o) { o.policy.stride_s = 9; }), ""},
-      {unused(&EventCounts::outside_window, 36, 0,
+      {unused(EventFate::kOutsideWindow, 36, 0, [](auto& o) { o.limits.t0_ns = 5; }), ""},
+      {unused(EventFate::kOutsideWindow, 36, 0, [](auto& o) { o.limits.t1_ns = 5; }), ""},
+      {unused(EventFate::kOutsideWindow, 36, 0, [](auto& o) { o.only_window = Window{}; }), ""},
+      {unused(EventFate::kOutsideWindow, 36, 0, [](auto& o) { o.policy.stride_s = 9; }), ""},
+      {unused(EventFate::kOutsideWindow, 36, 0,
               [](auto& o) {
                 o.policy.stride_s = 9;
                 o.policy.policy = KeyframePolicyKind::kEvents;
@@ -574,24 +574,29 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
       {live([](auto&) {}), ""},
       {live([](auto& s) {
          QueueCounts& camera = s.live->cameras[1];
-         camera = {200, 0, 40, 20, 0, 80, 1, 2, 0, 10};  // held, queued and paused are not lost
-         s.counts.windows_given_up.jump = 3;
+         camera.held = 40;  // like queued and paused events, these are not lost
+         camera.queued = 20;
+         camera.lost = 10;
+         camera.fates[EventFate::kPaused] = 80;
+         camera.fates[EventFate::kRefused] = 1;
+         camera.fates[EventFate::kAfterEnd] = 2;
+         s.counts.dropped_windows[DropReason::kJump] = 3;
        }),
        "events-lost: 6.5 % of the events were lost; 3 windows given up: 3 "},
-      {live([](auto& s) { s.live->cameras[1].thinned = 1; }),
+      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kThinned] = 1; }),
        "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
        "[live] max_event_rate lets pass"},
       {live([](auto& s) {
-         s.live->cameras[1].thinned = 1;
+         s.live->cameras[1].fates[EventFate::kThinned] = 1;
          s.live->too_large = "a window needs 5 events";
        }),
        "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
        "[live] max_event_rate lets pass; a window needs 5 events"},
-      {live([](auto& s) { s.live->cameras[1].dropped = 3; }),
+      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kQueueFull] = 3; }),
        "events-lost: 1.5 % of the events were lost; 0 windows given up; the machine is too slow"},
       {live([](auto& s) {
-         s.counts.windows_given_up.overload = 2;
-         s.counts.windows_given_up.error = 1;
+         s.counts.dropped_windows[DropReason::kOverload] = 2;
+         s.counts.dropped_windows[DropReason::kError] = 1;
        }),
        "events-lost: 0.0 % of the events were lost; 3 windows given up: "},
       {live([](auto& s) {
@@ -608,17 +613,17 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
   }
   SessionStatus none = sound;  // without a keyframe its error says why
   none.counts.keyframes = 0;
-  none.counts.cameras[0].without_pose = none.counts.windows_without_events = 60;
+  none.counts.cameras[0][EventFate::kWithoutPose] = none.counts.windows_without_events = 60;
   none.counts.keyframes_without_pose = 1;
   EXPECT_THAT(linesOf(sessionWarnings(none, {})), IsEmpty());
 }
 
 TEST(SessionStatus, IsSaidInWords) {
   SessionStatus status;
-  WindowsGivenUp& windows = status.counts.windows_given_up;
+  DroppedWindows& windows = status.counts.dropped_windows;
   EXPECT_EQ(asText(windows), "0 windows given up");
-  windows.overload = 2;
-  windows.no_pose = 1;
+  windows[DropReason::kOverload] = 2;
+  windows[DropReason::kNoPose] = 1;
   EXPECT_EQ(asText(windows), "3 windows given up: 2 for overload, 1 without poses");
   status.chosen = {{"window_s", 0.5, "why"}, {"num_planes", 60, "so"}};
   EXPECT_EQ(choiceText(status),

@@ -148,7 +148,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     if (kind != kTake) {
       if (kind == kPause) {
         queue.skip(packet(camera, one.t_ns, one.events));
-        counts.paused += one.events;
+        counts.fates[EventFate::kPaused] += one.events;
         if (one.events > 0) waiting.push_back({one.camera, 0, one.t_ns, true});
       } else {
         queue.add(packet(camera, one.t_ns, one.events));
@@ -158,7 +158,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
       }
       while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
              static_cast<double>(sum(bytes_of)) > options.max_queue_mb * 1e6) {
-        expected[waiting.front().camera].dropped += waiting.front().events;
+        expected[waiting.front().camera].fates[EventFate::kQueueFull] += waiting.front().events;
         miss(waiting.front());
         waiting.pop_front();
       }
@@ -189,10 +189,11 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     for (const auto& [index, of] : queue.counts()) {
       const QueueCounts& other = expected.at(index);
       RC_ASSERT(of.received == other.received);
-      RC_ASSERT(of.dropped == other.dropped);
-      RC_ASSERT(of.paused == other.paused);
+      RC_ASSERT(of.fates[EventFate::kQueueFull] == other.fates[EventFate::kQueueFull]);
+      RC_ASSERT(of.fates[EventFate::kPaused] == other.fates[EventFate::kPaused]);
       RC_ASSERT(of.taken == other.taken);
-      RC_ASSERT(of.queued == of.received - of.dropped - of.paused - of.taken);
+      RC_ASSERT(of.queued == of.received - of.fates[EventFate::kQueueFull] -
+                                 of.fates[EventFate::kPaused] - of.taken);
     }
   }
 }
@@ -235,7 +236,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   for (const PoseSample& pose : batch.poses) poses_ns.push_back(pose.t_ns);
   RC_ASSERT(events_ns == expected);
   RC_ASSERT(poses_ns == expected);
-  RC_ASSERT(queue.counts().at(0).refused == wrong);
+  RC_ASSERT(queue.counts().at(0).fates[EventFate::kRefused] == wrong);
   RC_ASSERT(queue.refusedPoses() == wrong);
 }
 
@@ -252,11 +253,11 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_TRUE(batch.ended);
   ASSERT_EQ(batch.packets.size(), 2U);
   EXPECT_EQ(batch.packets[1].events.size(), 10U);
-  EXPECT_EQ(queue.counts().at(0).thinned, 20U);
-  EXPECT_EQ(queue.counts().at(0).after_end, 30U);
+  EXPECT_EQ(queue.counts().at(0).fates[EventFate::kThinned], 20U);
+  EXPECT_EQ(queue.counts().at(0).fates[EventFate::kAfterEnd], 30U);
   EXPECT_EQ(queue.counts().at(0).queued, 0U);
   queue.skip(packet(0, 7, 5));
-  EXPECT_EQ(queue.counts().at(0).paused, 5U);
+  EXPECT_EQ(queue.counts().at(0).fates[EventFate::kPaused], 5U);
   EXPECT_EQ(queue.counts().at(0).received, 65U);
   EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
   queue.add(PoseSample{{}, 1, {}, {}});

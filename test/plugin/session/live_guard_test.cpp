@@ -119,7 +119,7 @@ TEST(LiveGuard, InputOfTheNewClockIsHeldInOrderAndTheFormerOneForgotten) {
   guard.noteOlderPose(1000 * kMillisecond);
   guard.noteOlderPose(2000 * kMillisecond);
   ASSERT_TRUE(guard.clockWentBack());
-  guard.noteMissing(0, {kMaxTimeNs, &WindowsGivenUp::paused});
+  guard.noteMissing(0, {kMaxTimeNs, DropReason::kPaused});
   std::string order;
   guard.hold([&] { order += "a"; }, 5);
   guard.hold([&] { order += "b"; }, 2);
@@ -147,7 +147,7 @@ TEST(LiveGuard, DropsTheWindowsThatNeedMissingEventsInBothModes) {
   recording.cameras[1].time_offset_ns =
       -100 * kMillisecond;  // its clock is ahead of that of the poses
   const std::int64_t start_ns = SyntheticRecording::kStartNs;
-  constexpr GiveUpReason kPaused = &WindowsGivenUp::paused;
+  constexpr DropReason kPaused = DropReason::kPaused;
   enum class Call { kNext, kOverdue, kAll };
   struct Row {
     const char* what;
@@ -177,7 +177,8 @@ TEST(LiveGuard, DropsTheWindowsThatNeedMissingEventsInBothModes) {
         if (row.call == Call::kOverdue) guard.dropOverdue(mapper, at_ns);
         if (row.call == Call::kAll) guard.dropAllMissing(mapper);
       }
-      EXPECT_EQ(mapper.counts().windows_given_up.paused, row.windows) << row.what << " " << live;
+      EXPECT_EQ(mapper.counts().dropped_windows[DropReason::kPaused], row.windows)
+          << row.what << " " << live;
     }
   }
 }
@@ -216,7 +217,8 @@ TEST(LiveGuard, WindowsAreDroppedWhosePosesAreOverdue) {
     guard.notePose(recording.poses.back());
     const auto needed_ns =
         guard.limitWaits(mapper, poses, TimeSpan{0, last_ns + row.events_until_ms * kMillisecond});
-    EXPECT_EQ(mapper.counts().windows_given_up.no_pose > 0, row.drops) << row.events_until_ms;
+    EXPECT_EQ(mapper.counts().dropped_windows[DropReason::kNoPose] > 0, row.drops)
+        << row.events_until_ms;
     EXPECT_EQ(needed_ns, row.live ? std::optional(last_ns - 600'000 * kMillisecond) : std::nullopt);
   }
 }

@@ -150,14 +150,15 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   EXPECT_FALSE(mapper.points()->empty());
   const SessionStatus before = mapper.status();
   EXPECT_LE(before.live->cameras.at(0).queued + before.live->cameras.at(1).queued, 2500U);
-  EXPECT_GT(before.live->cameras.at(0).dropped, 0U);
+  EXPECT_GT(before.live->cameras.at(0).fates[EventFate::kQueueFull], 0U);
   go_on.set_value();
   mapper.finish();
 
   const SessionStatus after = mapper.status();
   expectSumsAgree(after);
-  EXPECT_GT(after.counts.windows_given_up.overload, 0U);
-  EXPECT_EQ(after.counts.windows_given_up.total(), after.counts.windows_given_up.overload);
+  EXPECT_GT(after.counts.dropped_windows[DropReason::kOverload], 0U);
+  EXPECT_EQ(after.counts.dropped_windows.total(),
+            after.counts.dropped_windows[DropReason::kOverload]);
   const std::set<std::int64_t> times = timesOf(*mapper.snapshot());
   EXPECT_GT(*times.rbegin(), recording.poses.back().t_ns - 300 * kMsNs) << "the newest window";
   const std::set<std::int64_t> all = timesOf(*mapOf(syntheticOptions(), samples));
@@ -212,7 +213,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
     addEvents(session, recording);
     EXPECT_EQ(mapRest(session).size(), newest_s > 600 ? 0U : 11U);
     const EventCounts counts = session.status().counts.total();
-    EXPECT_EQ(counts.dropped == counts.read, newest_s > 600);
+    EXPECT_EQ(counts[EventFate::kDropped] == counts.read, newest_s > 600);
   }
   const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
   MappingSession session(live());
@@ -254,7 +255,7 @@ TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
     EXPECT_NEAR(window->value * events / length_s, 500, 10) << reason;
     EXPECT_GT(mapper.points()->size(), 30U);
     EXPECT_GT(static_cast<double>(mapper.snapshot()->trajectory.size()), 2.7 / window->value);
-    EXPECT_EQ(status.counts.windows_given_up.total(), 0U) << asText(status.counts.windows_given_up);
+    EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
     EXPECT_EQ(status.live->dropRatio(), 0) << "whether the rig is known at once or not";
   }
 }
@@ -280,16 +281,16 @@ TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnEr
 
     const SessionStatus status = mapper.status();
     expectSumsAgree(status);
-    const WindowsGivenUp& given_up = status.counts.windows_given_up;
-    EXPECT_EQ(given_up.overload, 0U) << asText(given_up);
+    const DroppedWindows& dropped = status.counts.dropped_windows;
+    EXPECT_EQ(dropped[DropReason::kOverload], 0U) << asText(dropped);
     if (is_chosen) {
-      EXPECT_EQ(given_up.too_large, 0U);
+      EXPECT_EQ(dropped[DropReason::kTooLarge], 0U);
       EXPECT_EQ(status.live->errors, 0U);
       EXPECT_GT(status.choices, 1U);
       continue;
     }
     EXPECT_GE(status.counts.keyframes, 2U) << "while there were fewer events";
-    EXPECT_GE(given_up.too_large, 2U) << asText(given_up);
+    EXPECT_GE(dropped[DropReason::kTooLarge], 2U) << asText(dropped);
     EXPECT_GE(status.live->errors, 1U);
     EXPECT_THAT(status.live->too_large,
                 testing::MatchesRegex("a window needs [0-9]+ events, the queue holds 2000: "
@@ -329,10 +330,12 @@ TEST(LiveMapper, AnEventOrAPoseThatIsFarAheadIsRejectedAlone) {
     expectSumsAgree(status);
     EXPECT_GT(events, 1U);
     EXPECT_GT(poses, 1U);
-    EXPECT_EQ(status.live->cameras.at(0).refused + status.live->cameras.at(1).refused, events);
+    EXPECT_EQ(status.live->cameras.at(0).fates[EventFate::kRefused] +
+                  status.live->cameras.at(1).fates[EventFate::kRefused],
+              events);
     EXPECT_EQ(status.live->refused_poses, poses);
     EXPECT_EQ(status.live->clock_steps, 0U);
-    EXPECT_EQ(status.counts.windows_given_up.total(), 0U) << asText(status.counts.windows_given_up);
+    EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
     expectSameMap(*mapper.snapshot(), *expected);
   }
 }
@@ -377,15 +380,14 @@ TEST(LiveMapper, EventsThatWaitForPosesAreBoundedInNumberAndMemory) {
       if (pose != nullptr && pose->t_ns > SyntheticRecording::kStartNs + 300 * kMsNs) continue;
       addPatiently(mapper, {sample});
       const EventCounts all = mapper.status().counts.total();
-      most =
-          std::max(most, all.read - all.used - all.without_pose - all.outside_window - all.dropped);
+      most = std::max(most, all.read - all.fates.total());
     }
     EXPECT_GT(most, 900U) << by_memory;
     EXPECT_LT(most, 1100U) << "and a packet or two: " << by_memory;
     mapper.finish();
     const SessionStatus status = mapper.status();
     expectSumsAgree(status);
-    EXPECT_GT(status.counts.windows_given_up.overload, 2U);
+    EXPECT_GT(status.counts.dropped_windows[DropReason::kOverload], 2U);
     EXPECT_GT(status.live->dropRatio(), 0.3);
   }
 }
@@ -445,7 +447,8 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
     RC_ASSERT(queue.held + queue.queued == 0U);
     const EventCounts counts = countsOf(status, camera);
     received += queue.received;
-    kept += counts.used + counts.outside_window + queue.paused;
+    kept += counts[EventFate::kUsed] + counts[EventFate::kOutsideWindow] +
+            queue.fates[EventFate::kPaused];
   }
   RC_ASSERT(std::abs(status.live->dropRatio() * static_cast<double>(received) -
                      static_cast<double>(received - kept)) < 0.5);

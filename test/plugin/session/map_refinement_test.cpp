@@ -313,7 +313,7 @@ TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRefusesDoesNotShiftTheO
     }
   }
   EXPECT_EQ(refused, 2);
-  EXPECT_EQ(session.status().counts.windows_given_up.error, 2U);
+  EXPECT_EQ(session.status().counts.dropped_windows[DropReason::kError], 2U);
   EXPECT_EQ(session.status().counts.keyframes, keyframes.size());
   EXPECT_EQ(session.cloud().keyframes(), keyframes.size());
   ASSERT_EQ(session.T_world_ref().size(), keyframes.size());

@@ -91,15 +91,12 @@ inline EventCounts countsOf(const SessionStatus& status, int camera) {
 /// Live operation: each event has one count.
 inline void expectSumsAgree(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
-    EXPECT_EQ(queue.received, queue.thinned + queue.held + queue.queued + queue.dropped +
-                                  queue.paused + queue.refused + queue.after_end + queue.taken);
+    EXPECT_EQ(queue.received, queue.held + queue.queued + queue.taken + queue.fates.total());
     const EventCounts counts = countsOf(status, camera);
     const auto rejected = status.refused_events.find(camera);
     EXPECT_EQ(queue.taken,
               counts.read + (rejected == status.refused_events.end() ? 0 : rejected->second));
-    EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
-                               counts.dropped + counts.filtered + counts.outside_lens +
-                               counts.over_budget);
+    EXPECT_EQ(counts.read, counts.fates.total());
   }
 }
 

@@ -135,10 +135,13 @@ TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
     const SessionStatus status = mapper.status();
     std::uint64_t paused = 0;
     for (const auto& [camera, count] : status.paused_events) paused += count;
-    if (isLive()) paused = status.live->cameras.at(0).paused + status.live->cameras.at(1).paused;
+    if (isLive())
+      paused = status.live->cameras.at(0).fates[EventFate::kPaused] +
+               status.live->cameras.at(1).fates[EventFate::kPaused];
     EXPECT_GT(paused, 0U);
     EXPECT_EQ(paused + status.counts.total().read, fed);
-    EXPECT_EQ(status.counts.windows_given_up.total(), status.counts.windows_given_up.paused);
+    EXPECT_EQ(status.counts.dropped_windows.total(),
+              status.counts.dropped_windows[DropReason::kPaused]);
   }
 }
 
@@ -161,7 +164,9 @@ TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
   EXPECT_EQ(status.counts.total().read, events);
   if (!isLive()) return;
   expectSumsAgree(status);
-  EXPECT_EQ(status.live->cameras.at(0).after_end + status.live->cameras.at(1).after_end, events);
+  EXPECT_EQ(status.live->cameras.at(0).fates[EventFate::kAfterEnd] +
+                status.live->cameras.at(1).fates[EventFate::kAfterEnd],
+            events);
   EXPECT_EQ(status.live->refused_poses, poses);
   EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);
 }
@@ -286,7 +291,7 @@ TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
   EXPECT_EQ(status.live->errors, 1U);
   EXPECT_FALSE(status.live->failing);
   EXPECT_THAT(status.live->last_error, HasSubstr("the disk is full"));
-  EXPECT_EQ(status.counts.windows_given_up.error, 1U);
+  EXPECT_EQ(status.counts.dropped_windows[DropReason::kError], 1U);
   EXPECT_EQ(delivered, 2U) << "of three";
   std::set<std::int64_t> times = timesOf(*expected);
   times.erase(std::next(times.begin()));

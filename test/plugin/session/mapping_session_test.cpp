@@ -25,8 +25,7 @@ using testing::Not;
 void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
   const EventCounts total = status.counts.total();
   EXPECT_EQ(total.read, events);
-  EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped +
-                            total.filtered + total.outside_lens + total.over_budget);
+  EXPECT_EQ(total.read, total.fates.total());
 }
 
 /// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
@@ -56,8 +55,8 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
     const MapperCounts counts = session.status().counts;
     expectEventsAddUp(session.status(), recording.totalEvents());
     EXPECT_EQ(counts.votes.total(), 30 * counts.event_uses);
-    EXPECT_GT(counts.event_uses, counts.total().used) << "windows overlap";
-    EXPECT_EQ(counts.total().outside_window > 100, live);
+    EXPECT_GT(counts.event_uses, counts.total()[EventFate::kUsed]) << "windows overlap";
+    EXPECT_EQ(counts.total()[EventFate::kOutsideWindow] > 100, live);
   }
 }
 
@@ -117,7 +116,7 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
     EventFusionOptions options = automaticOptions();
     if (is_full) options.live.max_queue_mb = kMaxMb;
     MappingSession session(options);
-    if (!is_full) session.noteMissing(0, {kMinTimeNs, &WindowsGivenUp::paused});
+    if (!is_full) session.noteMissing(0, {kMinTimeNs, DropReason::kPaused});
     EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
     ASSERT_EQ(session.status().chosen.size(), 5U);
     for (const ChosenOption& option : session.status().chosen) {

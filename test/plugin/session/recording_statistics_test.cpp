@@ -195,10 +195,10 @@ TEST(WhyNoKeyframe, SaysWhatTookAllEvents) {
                               std::uint64_t dropped, std::uint64_t used) {
     return why([&](auto& status, auto&) {
       EventCounts& counts = status.counts.cameras[1];
-      counts.filtered = filtered;
-      counts.outside_lens = outside_lens;
-      counts.dropped = dropped;
-      counts.used = used;
+      counts[EventFate::kFiltered] = filtered;
+      counts[EventFate::kOutsideLens] = outside_lens;
+      counts[EventFate::kDropped] = dropped;
+      counts[EventFate::kUsed] = used;
     });
   };
   const std::string noise =

@@ -38,18 +38,19 @@ Table tableOf(const SessionStatus& status) {
     const EventCounts& of = counts.cameras[c];
     const auto name = [&](const char* what) { return fmt::format("camera {} {}", c, what); };
     table[name("read")] = of.read;
-    table[name("used")] = of.used;
-    table[name("without_pose")] = of.without_pose;
-    table[name("outside_window")] = of.outside_window;
-    table[name("dropped")] = of.dropped;
-    table[name("other")] = of.filtered + of.outside_lens + of.over_budget;
+    table[name("used")] = of[EventFate::kUsed];
+    table[name("without_pose")] = of[EventFate::kWithoutPose];
+    table[name("outside_window")] = of[EventFate::kOutsideWindow];
+    table[name("dropped")] = of[EventFate::kDropped];
+    table[name("other")] =
+        of[EventFate::kFiltered] + of[EventFate::kOutsideLens] + of[EventFate::kOverBudget];
     table[name("silent in keyframes")] = status.silent_keyframes.at(c);
   }
   for (const auto& [camera, events] : status.refused_events) {
     table[fmt::format("camera {} refused", camera)] = events;
   }
-  for (const NamedReason& reason : kGiveUpReasons) {
-    table[std::string("given up: ") + reason.name] = counts.windows_given_up.*reason.count;
+  for (const DropReasonRow& row : kDropReasons) {
+    table[std::string("given up: ") + row.key] = counts.dropped_windows[row.reason];
   }
   table["keyframes"] = counts.keyframes;
   table["keyframes_without_pose"] = counts.keyframes_without_pose;
@@ -125,7 +126,7 @@ class Model {
     for (const Event& event : events) {
       ++counts.read;
       if (is_late(event)) ++status.counts.late_events;
-      if (is_late(event) || event.t_ns < clock_.released_ns) ++counts.dropped;
+      if (is_late(event) || event.t_ns < clock_.released_ns) ++counts[EventFate::kDropped];
       if (is_late(event)) continue;
       newest_ns = std::max(newest_ns, event.t_ns);
       in_time.push_back(event.t_ns);
@@ -190,11 +191,12 @@ class Model {
     const bool mapped = !empty && hasPose(window.t_ref_ns);
     ++clock_.next;
     if (outcome == Outcome::kTooMuch || (outcome == Outcome::kMappingFails && mapped)) {
-      ++(outcome == Outcome::kTooMuch ? counts.windows_given_up.overload
-                                      : counts.windows_given_up.error);
+      ++(outcome == Outcome::kTooMuch ? counts.dropped_windows[DropReason::kOverload]
+                                      : counts.dropped_windows[DropReason::kError]);
       lose(window.t0_ns, nextStartNs());
     } else if (mapped) {
-      ++(outcome == Outcome::kMapped ? counts.keyframes : counts.windows_given_up.error);
+      ++(outcome == Outcome::kMapped ? counts.keyframes
+                                     : counts.dropped_windows[DropReason::kError]);
       for (std::size_t c = 0; c < kCameras; ++c) {
         bool silent = true;
         for (Held& event : clock_.cameras[c].held) {
@@ -225,8 +227,8 @@ class Model {
         static_cast<double>(heldEvents()) * static_cast<double>(window_ns_) / held_ns;
     const bool too_large = rig_complete_ && needed > queue_events_ &&
                            static_cast<double>(heldEvents()) > queue_events_ / 2;
-    giveUpBefore((oldest_ns + clock_.reached_ns) / 2 + 1,
-                 too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
+    dropWindowsBefore((oldest_ns + clock_.reached_ns) / 2 + 1,
+                      too_large ? DropReason::kTooLarge : DropReason::kOverload);
   }
 
   /// No window can be mapped now.
@@ -240,7 +242,7 @@ class Model {
     if (!waiting_.empty()) newest_pose_ns = waiting_.back().t_ns;
     const std::int64_t overdue_ns = clock_.reached_ns - pose_wait_ns_;
     if (!newest_pose_ns || *newest_pose_ns < overdue_ns) {
-      giveUpBefore(overdue_ns, &WindowsGivenUp::no_pose);
+      dropWindowsBefore(overdue_ns, DropReason::kNoPose);
     }
   }
 
@@ -340,7 +342,7 @@ class Model {
     if (clock_.next_stretch.empty()) return false;
     if (!finished_ && eventsCompleteNs() < clock_.newest_pose->t_ns) return false;
     ++status.live->pose_jumps;
-    giveUpBefore(clock_.next_stretch.front().t_ns, &WindowsGivenUp::jump);
+    dropWindowsBefore(clock_.next_stretch.front().t_ns, DropReason::kJump);
     clock_.newest_pose.reset();
     useAll(std::exchange(clock_.next_stretch, {}));
     return true;
@@ -381,21 +383,21 @@ class Model {
     }
   }
 
-  void giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {
+  void dropWindowsBefore(std::int64_t t_ns, DropReason reason) {
     std::int64_t from_ns = kMinTimeNs;
     std::int64_t until_ns = t_ns;
     if (clock_.start_ns) {
       from_ns = nextStartNs();
-      for (; nextStartNs() < t_ns; ++clock_.next) ++(status.counts.windows_given_up.*reason);
+      for (; nextStartNs() < t_ns; ++clock_.next) ++status.counts.dropped_windows[reason];
       until_ns = nextStartNs();
     }
-    if (reason != &WindowsGivenUp::paused) lose(from_ns, until_ns);
+    if (reason != DropReason::kPaused) lose(from_ns, until_ns);
     release(t_ns);
   }
   void giveUpMissing(int camera, std::int64_t next_ns) {
     const auto missing = clock_.missing.find(camera);
     if (missing == clock_.missing.end()) return;
-    giveUpBefore(std::min(missing->second.until_ns, next_ns), missing->second.reason);
+    dropWindowsBefore(std::min(missing->second.until_ns, next_ns), missing->second.reason);
     clock_.missing.erase(camera);
   }
   void lose(std::int64_t t0_ns, std::int64_t t1_ns) { clock_.lost_ns.push_back({t0_ns, t1_ns}); }
@@ -417,10 +419,10 @@ class Model {
         if (event.t_ns >= t_ns) {
           later.push_back(event);
         } else {
-          ++(event.used             ? counts.used
-             : !hasPose(event.t_ns) ? counts.without_pose
-             : lost                 ? counts.dropped
-                                    : counts.outside_window);
+          ++(event.used             ? counts[EventFate::kUsed]
+             : !hasPose(event.t_ns) ? counts[EventFate::kWithoutPose]
+             : lost                 ? counts[EventFate::kDropped]
+                                    : counts[EventFate::kOutsideWindow]);
         }
       }
       clock_.cameras[c].held = later;
@@ -441,7 +443,7 @@ class Model {
   /// Once the complete windows before are mapped.
   bool beginClock() {
     if (!clock_reset_) return false;
-    giveUpBefore(clock_.reached_ns + 1, &WindowsGivenUp::clock_reset);
+    dropWindowsBefore(clock_.reached_ns + 1, DropReason::kClockReset);
     clock_ = {};
     ++status.live->clock_steps;
     clock_reset_ = false;
@@ -521,7 +523,7 @@ class Run {
     RC_ASSERT(refinement.waiting + refinement.failures == 0U);
     queue_.add(sampleOf(recording_.poses[0]));
     queue_.add(EventPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
-    RC_ASSERT(queue_.counts().at(0).after_end == 1U);
+    RC_ASSERT(queue_.counts().at(0).fates[EventFate::kAfterEnd] == 1U);
     RC_ASSERT(queue_.refusedPoses() >= 1U);
   }
 
@@ -637,7 +639,7 @@ class Run {
     }
     for (const EventPacket& packet : batch.packets) {
       if (packet.skipped_until_ns) {
-        const MissingEvents missing{*packet.skipped_until_ns, &WindowsGivenUp::paused};
+        const MissingEvents missing{*packet.skipped_until_ns, DropReason::kPaused};
         session_.noteMissing(packet.camera, missing);
         model_.noteMissing(packet.camera, missing);
         continue;
@@ -696,7 +698,7 @@ class Run {
       return keyframe.has_value();
     } catch (const std::runtime_error&) {
       RC_ASSERT(!predicts_ || expected);
-      RC_ASSERT(session_.giveUpFailed());
+      RC_ASSERT(session_.dropFailedWindow());
       return true;
     }
   }
@@ -709,8 +711,7 @@ class Run {
       RC_ASSERT(differences(table, tableOf(model_.status)) == std::vector<std::string>{});
     }
     const EventCounts all = status.counts.total();
-    RC_ASSERT(all.read ==
-              all.used + all.without_pose + all.outside_window + all.dropped + status.held_events);
+    RC_ASSERT(all.read == all.fates.total() + status.held_events);
     RC_ASSERT(status.counts.keyframes == keyframes_);
     RC_ASSERT(session_.T_odom_ref().size() == keyframes_);
     RC_ASSERT(session_.T_world_ref().size() == keyframes_);
@@ -729,7 +730,7 @@ class Run {
       const EventCounts& of = status.counts.cameras.at(index);
       RC_ASSERT(counts.taken == of.read + refused_events);
       RC_ASSERT(status.live->cameras.at(camera).lost ==
-                refused_events + of.dropped + of.without_pose);
+                refused_events + of[EventFate::kDropped] + of[EventFate::kWithoutPose]);
     }
   }
 

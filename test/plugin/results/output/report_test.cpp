@@ -134,7 +134,7 @@ MapReport usualReport() {
   MapReport report;
   report.counts.cameras.resize(1);
   report.counts.cameras[0].read = 1000;
-  report.counts.cameras[0].used = 1000;
+  report.counts.cameras[0][EventFate::kUsed] = 1000;
   report.counts.keyframes = 31;
   report.points = 48210;
   report.times.real.total = 21.2;
@@ -179,7 +179,7 @@ TEST(Summary, EachFactHasItsLine) {
        "that takes no part, 20.0 % outside the lens model\n"},
       {[](MapReport& report) {
          report.counts.cameras.push_back(report.counts.cameras[0]);
-         report.counts.cameras[1].used = 0;
+         report.counts.cameras[1][EventFate::kUsed] = 0;
        },
        "events      50.0 % of 2000 used\n"},
       {[](MapReport& report) { report.stopped_at = 0.432; },

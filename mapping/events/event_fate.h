@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <numeric>
+
+namespace efm {
+
+/// A count for each enumerator of `Kind`, 0 to N - 1.
+template <typename Kind, std::size_t N>
+struct CountsBy {
+  std::array<std::uint64_t, N> counts{};
+
+  std::uint64_t& operator[](Kind kind) { return counts[static_cast<std::size_t>(kind)]; }
+  std::uint64_t operator[](Kind kind) const { return counts[static_cast<std::size_t>(kind)]; }
+  std::uint64_t total() const {
+    return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  }
+  CountsBy& operator+=(const CountsBy& other) {
+    for (std::size_t i = 0; i < N; ++i) counts[i] += other.counts[i];
+    return *this;
+  }
+  friend bool operator==(const CountsBy& a, const CountsBy& b) { return a.counts == b.counts; }
+};
+
+/// What became of an event. Each event has one fate, at the latest when the mapping ends.
+enum class EventFate {
+  // Of the mapping.
+  kUsed,           ///< Voted in at least one keyframe.
+  kWithoutPose,    ///< The trajectory has no pose at its time.
+  kOutsideWindow,  ///< In no window that was mapped.
+  kDropped,        ///< Came too late, in a window that was dropped, or of an unselected camera.
+  kFiltered,       ///< Removed as noise, with a pose or without.
+  kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
+  kOverBudget,     ///< In a window that was mapped, but not among the events chosen there.
+  // Of the queue, in live operation, before the mapping.
+  kThinned,    ///< Left out by the budget in sensor time.
+  kQueueFull,  ///< Dropped because the queue was full.
+  kRefused,    ///< In a packet that contradicts its camera, or over a second ahead of its stream.
+  kPaused,     ///< Came while map updating was disabled.
+  kAfterEnd,   ///< Came after the end of the input.
+};
+
+struct EventFateRow {
+  EventFate fate;
+  const char* key;      ///< In report.json.
+  const char* text;     ///< What follows "5.1 %" in a summary.
+  bool is_loss = true;  ///< Lost in live operation; the others are what the options ask for.
+};
+
+inline constexpr EventFateRow kEventFates[] = {
+    {EventFate::kUsed, "used", "used", false},
+    {EventFate::kWithoutPose, "without_pose", "without a pose"},
+    {EventFate::kOutsideWindow, "outside_window", "outside the keyframes' windows", false},
+    {EventFate::kDropped, "dropped", "too late, or of a camera that takes no part"},
+    {EventFate::kFiltered, "filtered", "filtered as noise", false},
+    {EventFate::kOutsideLens, "outside_lens", "outside the lens model", false},
+    {EventFate::kOverBudget, "over_budget", "over max_events_per_camera", false},
+
+    {EventFate::kThinned, "thinned", "thinned"},
+    {EventFate::kQueueFull, "dropped", "dropped"},
+    {EventFate::kRefused, "refused", "refused"},
+    {EventFate::kPaused, "paused", "paused", false},
+    {EventFate::kAfterEnd, "after_end", "after the end"},
+};
+constexpr const EventFateRow& rowOf(EventFate fate) {
+  return kEventFates[static_cast<std::size_t>(fate)];
+}
+constexpr bool isOfQueue(EventFate fate) { return fate >= EventFate::kThinned; }
+
+/// The number of events by their fates.
+struct EventFates : CountsBy<EventFate, std::size(kEventFates)> {
+  /// Events that are lost in live operation.
+  std::uint64_t losses() const {
+    std::uint64_t sum = 0;
+    for (const EventFateRow& row : kEventFates) sum += row.is_loss ? (*this)[row.fate] : 0;
+    return sum;
+  }
+};
+
+/// One camera's events in the mapping: `read` is the sum of the fates of the mapping.
+struct EventCounts {
+  std::uint64_t read = 0;
+  EventFates fates;
+
+  std::uint64_t& operator[](EventFate fate) { return fates[fate]; }
+  std::uint64_t operator[](EventFate fate) const { return fates[fate]; }
+  EventCounts& operator+=(const EventCounts& other) {
+    read += other.read;
+    fates += other.fates;
+    return *this;
+  }
+  friend bool operator==(const EventCounts& a, const EventCounts& b) {
+    return a.read == b.read && a.fates == b.fates;
+  }
+};
+
+}  // namespace efm
