@@ -73,7 +73,7 @@ void printCameras(const RecordingStatistics& statistics) {
   for (const auto& [key, camera] : statistics.cameras()) {
     fmt::print("{}: {}\n  ", camera.label, asText(camera.camera.model));
     printStream(camera.events, "events");
-    if (span) printRate(camera.rate, span->first, span->second);
+    if (span) printRate(camera.rate, span->first_ns, span->last_ns);
   }
   const auto& cameras = statistics.cameras();
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
@@ -86,7 +86,7 @@ void printCameras(const RecordingStatistics& statistics) {
 
 void printPoses(const RecordingStatistics& statistics) {
   std::optional<std::int64_t> start_ns;
-  if (const auto events = statistics.eventSpan()) start_ns = events->first;
+  if (const auto events = statistics.eventSpan()) start_ns = events->first_ns;
   for (const auto& [source, used] : statistics.poseSources()) {
     const StreamStatistics& poses = used.poses;
     fmt::print("{}:\n  ", asText(source));
@@ -100,8 +100,10 @@ void printPoses(const RecordingStatistics& statistics) {
   }
   if (statistics.poseSources().empty()) {
     fmt::print("0 poses\n");
-  } else if (statistics.eventSpan()) {
-    fmt::print("  the poses cover {:.1f} % of the events' time\n", 100 * statistics.overlap());
+  } else if (const auto events = statistics.eventSpan()) {
+    const StreamStatistics& poses = statistics.usedPoses()->poses;
+    fmt::print("  the poses cover {:.1f} % of the events' time\n",
+               100 * overlapOf(*events, {*poses.first_ns, *poses.last_ns}));
   }
   fmt::print("  {} events before the first pose, {} after the last\n",
              statistics.eventsBeforePoses(), statistics.eventsAfterPoses());
@@ -118,55 +120,25 @@ void print(const Contents& contents, const RecordingCounts& counts) {
   }
 }
 
-std::vector<Warning> warningsOf(const Contents& contents, const HealthLimits& limits,
-                                const RecordingCounts& counts) {
-  std::vector<Warning> warnings = missingParts(contents.statistics);
-  for (Warning& warning : healthWarnings(contents.statistics, limits)) {
-    warnings.push_back(std::move(warning));
+/// Prints the values that `map` would choose, and uses their depths for the checks.
+/// @return the warnings about the poses.
+std::vector<Warning> judge(FirstLook& look, bool quiet, Findings& findings) {
+  const RecordingSurvey survey = look.finish();
+  if (survey.samples.empty()) return {};
+  const EventFusionOptions defaults = defaultOptions();
+  FusionMapperOptions options = defaults.mapper;
+  const std::vector<ChosenOption> chosen =
+      chooseOptions(defaults.automatic, survey.rig, survey.samples, survey.duration_s, options)
+          .options;
+  if (!quiet) {
+    fmt::print("the options that are auto would be:\n");
+    for (const ChosenOption& option : chosen) {
+      fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
+    }
   }
-  for (Warning& warning : lossWarnings(counts)) warnings.push_back(std::move(warning));
-  return warnings;
+  findings.use(options.keyframe.planes, chosen);
+  return survey.judgePoses(options).warnings;
 }
-
-/// Gives a survey the samples of a recording, as long as it takes them: a recording may lack
-/// what a map needs.
-class PatientSurveyor {
- public:
-  explicit PatientSurveyor(const EventFusionOptions& options) : options_(options) {}
-
-  void add(const Sample& sample) {
-    if (!surveyor_) return;
-    try {
-      surveyor_->add(sample);
-    } catch (const std::exception&) {
-      surveyor_.reset();
-    }
-  }
-  /// Prints the values that `map` would choose. @return the warnings about the poses.
-  /// @param limits receives the depths that were chosen.
-  std::vector<Warning> finish(bool quiet, HealthLimits& limits) {
-    if (!surveyor_) return {};
-    const RecordingSurvey survey = surveyor_->finish();
-    if (survey.samples.empty()) return {};
-    FusionMapperOptions options = options_.mapper;
-    const std::vector<ChosenOption> chosen =
-        chooseOptions(options_.automatic, survey.rig, survey.samples, survey.duration_s, options)
-            .options;
-    if (!quiet) {
-      fmt::print("the options that are auto would be:\n");
-      for (const ChosenOption& option : chosen) {
-        fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
-      }
-    }
-    limits.near_depth_m = motionDepth(options.keyframe.planes, chosen);
-    limits.far_depth_m = options.keyframe.planes.max_depth_m;
-    return survey.judgePoses(options).warnings;
-  }
-
- private:
-  EventFusionOptions options_;
-  std::optional<FirstLook> surveyor_{options_};
-};
 
 }  // namespace
 
@@ -179,14 +151,15 @@ int runInfo(const InfoArguments& arguments) {
   source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);
   Contents contents;
-  PatientSurveyor surveyor(defaultOptions());
+  FirstLook look(defaultOptions());
+  bool takes = true;  // a recording may lack parts of a map
   std::exception_ptr stopped;
   {
     Progress progress("reading", arguments.verbosity);
     try {
       while (const std::optional<Sample> sample = recording->next()) {
         contents.add(*sample);
-        surveyor.add(*sample);
+        takes = look.take(*sample);
         progress.show(recording->progress());
       }
     } catch (const std::exception&) {
@@ -200,11 +173,10 @@ int runInfo(const InfoArguments& arguments) {
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
   if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source.limits, *recording);
-  HealthLimits health;
-  std::vector<Warning> warnings = surveyor.finish(quiet, health);
-  for (Warning& warning : warningsOf(contents, health, recording->counts())) {
-    warnings.push_back(std::move(warning));
-  }
+  Findings findings{contents.statistics, recording->counts()};
+  std::vector<Warning> warnings;
+  if (takes) warnings = judge(look, quiet, findings);
+  for (Warning& warning : warningsOf(findings)) warnings.push_back(std::move(warning));
   printWarnings(warnings);
   return arguments.strict && failStrictly(warnings) ? kFailedStatus : 0;
 }

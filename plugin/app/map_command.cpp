@@ -84,15 +84,14 @@ void warnOfNoPoints(MapReport& report) {
   const PixelCounts& pixels = report.pixels;
   const std::uint64_t depths =
       pixels.candidates - pixels.at_nearest - pixels.at_farthest - pixels.ambiguous;
-  report.warnings.push_back(
-      {"no-points",
-       fmt::format(
-           "the map has no point: of {} pixels with contrast, {} fit best to the nearest plane and "
-           "{} to the farthest ([dsi] min_depth_m, max_depth_m), {} are ambiguous (the parallax is "
-           "small: [keyframes] window_s; [depth] min_quality), and {} with a depth were removed "
-           "([map] min_keyframes, outlier_radius_m); or the calibration and the poses do not "
-           "explain the events",
-           pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths)});
+  addWarning(
+      report.warnings, "no-points",
+      "the map has no point: of {} pixels with contrast, {} fit best to the nearest plane and "
+      "{} to the farthest ([dsi] min_depth_m, max_depth_m), {} are ambiguous (the parallax is "
+      "small: [keyframes] window_s; [depth] min_quality), and {} with a depth were removed "
+      "([map] min_keyframes, outlier_radius_m); or the calibration and the poses do not "
+      "explain the events",
+      pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths);
 }
 
 /// Few points are little evidence, however sure each of them is.
@@ -106,13 +105,12 @@ void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
   const auto step_m = coarseStepOf(cloud, report.options.cloud.voxel_size_m);
   if (!step_m) return;
   const auto& origin = cloud.sensor_origin_;
-  report.warnings.push_back(
-      {"far-coordinates",
-       fmt::format("a float has steps of {:.2g} m at the map's coordinates, over a tenth of a "
-                   "voxel: x, y and z of the PCD file are relative to its VIEWPOINT, ({:.0f}, "
-                   "{:.0f}, {:.0f}), which viewers do not add; MRPT's maps of points are rounded; "
-                   "map.ply has doubles (--set output.ply=true)",
-                   *step_m, origin.x(), origin.y(), origin.z())});
+  addWarning(report.warnings, "far-coordinates",
+             "a float has steps of {:.2g} m at the map's coordinates, over a tenth of a "
+             "voxel: x, y and z of the PCD file are relative to its VIEWPOINT, ({:.0f}, "
+             "{:.0f}, {:.0f}), which viewers do not add; MRPT's maps of points are rounded; "
+             "map.ply has doubles (--set output.ply=true)",
+             *step_m, origin.x(), origin.y(), origin.z());
 }
 
 /// Without MRPT, prints a note instead.
@@ -223,6 +221,7 @@ class MapCommand {
   MapCommand(const MappingArguments& given, OutputKind output_kind)
       : arguments(given), kind(output_kind), reader(readerOf(given)) {
     options = optionsOf(arguments, reader);
+    first.statistics = RecordingStatistics(statisticsOptions(options));
   }
 
   const MappingArguments& arguments;
@@ -230,7 +229,7 @@ class MapCommand {
   const OptionReader reader;
   const Interruption interruption{};
   EventFusionOptions options;
-  std::vector<ChosenOption> chosen;  ///< Those of the options that were automatic.
+  FirstPass first;
   std::unique_ptr<Recording> recording;
   std::optional<MapOutput> output;
   MapReport report;
@@ -269,9 +268,9 @@ class MapCommand {
 void MapCommand::begin() {
   began_ = std::chrono::steady_clock::now();
   const std::filesystem::path folder = outputFolder(arguments, kind);
-  const RecordingSource first = source();
-  refuseOutputFolder(folder, kind, arguments, first);
-  report.warnings = replacementWarnings(folder, first);
+  const RecordingSource all = source();
+  refuseOutputFolder(folder, kind, arguments, all);
+  report.warnings = replacementWarnings(folder, all);
   printWarnings(report.warnings);
   recording = firstLook();
   options.mapper.keyframe.sequence_maximum = sequenceMaximum();
@@ -280,7 +279,7 @@ void MapCommand::begin() {
   interruption.check();
   output.emplace(folder, kind, options.mapper.keyframe.planes,
                  arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
-                 namesOf(first));
+                 namesOf(all));
   printed_warnings_ = report.warnings.size();
 }
 
@@ -300,13 +299,12 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
       return std::nullopt;
     }
   };
-  bool takes = true;
-  while (std::optional<Sample> sample = takes ? next() : std::nullopt) {
-    try {
-      look.add(*sample);
-    } catch (const std::exception&) {  // the mapping reports it
-      takes = false;
-    }
+  bool takes = true;  // what it rejects, the mapping reports
+  std::optional<Sample> sample;
+  while ((takes || options.live.enabled) && (sample = next())) {
+    takes = look.take(*sample);
+    if (const auto* packet = std::get_if<EventPacket>(&*sample))
+      first.statistics.addEvents(*packet);
     held->hold(std::move(*sample));
     progress.show(held->read().progress());
   }
@@ -320,7 +318,7 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
     const double most = survey.most_events_per_s;
     fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, options.mapper.policy,
                  choice.options);
-    chosen = std::move(choice.options);
+    first.chosen = std::move(choice.options);
     options.automatic = {};
     if (!choice.is_proven) {
       report.doubts.push_back(choice.found_scene
@@ -342,14 +340,14 @@ std::optional<double> MapCommand::sequenceMaximum() {
   if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
     return std::nullopt;
   }
-  EventFusionOptions first = options;
-  first.mapper.only_window.reset();
-  first.refinement.enabled = false;  // changes no confidence
-  first.live.enabled = false;
+  EventFusionOptions of_pass = options;
+  of_pass.mapper.only_window.reset();
+  of_pass.refinement.enabled = false;  // changes no confidence
+  of_pass.live.enabled = false;
   RobustMaximum maximum;
   const std::unique_ptr<Recording> all = openRecording(source());
   MappingRun pass(
-      *all, first, chosen, std::min(arguments.verbosity, Verbosity::kNormal),
+      *all, of_pass, first, std::min(arguments.verbosity, Verbosity::kNormal),
       [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
         maximum.add(keyframe.max_confidence);
       },
@@ -573,7 +571,8 @@ int runMap(const MapArguments& arguments) {
       pictures.add(keyframe.map.depth, keyframe.view_events);
       ++written;
     });
-    MappingRun run(*command.recording, command.options, command.chosen, arguments.verbosity,
+    MappingRun run(*command.recording, command.options, std::move(command.first),
+                   arguments.verbosity,
                    [&](const KeyframeDepthMap& keyframe, const MappingRun& so_far) {
                      writer.add(keyframe);
                      watchers.add(so_far, keyframe);
@@ -621,7 +620,7 @@ int runDepth(const DepthArguments& arguments) {
     });
     const std::unique_ptr<NpyDsiFile> dsi = dsiFile(command, arguments);  // outlives the run
     bool made = false;
-    MappingRun run(*command.recording, options, command.chosen, arguments.verbosity,
+    MappingRun run(*command.recording, options, std::move(command.first), arguments.verbosity,
                    [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
                      made = true;
                      writer.add(keyframe);

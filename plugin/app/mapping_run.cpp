@@ -16,19 +16,18 @@
 
 namespace efm {
 
-MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options,
-                       std::vector<ChosenOption> chosen, Verbosity verbosity, Receive receive,
-                       const std::string& activity)
+MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
+                       Verbosity verbosity, Receive receive, const std::string& activity)
     : recording_(recording),
       options_(options),
-      chosen_(std::move(chosen)),
+      first_(std::move(first)),
       verbosity_(verbosity),
       receive_(std::move(receive)),
-      statistics_(statisticsOptions(options)),
-      depths_(options.mapper.keyframe.planes, chosen_),
+      depths_(options.mapper.keyframe.planes, first_.chosen),
       progress_(activity, verbosity) {
   options.validate();
-  Mapper::Callbacks callbacks;  // sessionWarnings summarises what the others say
+  first_.statistics.setWindow(statisticsOptions(options).window_s);
+  Mapper::Callbacks callbacks;  // the warnings summarise what the others say
   callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
     if (!options_.live.enabled) return deliver(keyframe);
     const std::lock_guard<std::mutex> lock(made_mutex_);  // the mapper's own thread
@@ -70,7 +69,7 @@ bool MappingRun::feedNext() {
   }
   if (!sample) return false;
   if (options_.live.enabled) waitForTimeOf(*sample);
-  statistics_.add(*sample);
+  if (std::holds_alternative<PoseSample>(*sample)) first_.statistics.add(*sample);
   try {
     mapper_->add(std::move(*sample));
   } catch (const std::invalid_argument& error) {
@@ -216,7 +215,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   report.silent_keyframes = status.silent_keyframes;
   report.live = status.live;
   report.options = options_;
-  report.chosen = chosen_;
+  report.chosen = first_.chosen;
   describeView(status.rig, options, report);
   report.sequence_maximum = options.keyframe.sequence_maximum;
   if (stopped) report.stopped_at = fraction();
@@ -229,13 +228,15 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   if (status.events) {
     report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }
-  statistics_.setCameras(status.rig.cameras);
-  append(report.warnings,
-         healthWarnings(statistics_, {motionDepth(planes, chosen_), planes.max_depth_m,
-                                      options.trajectory.max_pose_gap_s}));
-  append(report.warnings, depths_.warnings());
-  append(report.warnings, sessionWarnings(status, options));
-  append(report.warnings, lossWarnings(read));
+  first_.statistics.setCameras(status.rig.cameras);
+  Findings findings{first_.statistics, read};
+  findings.use(planes, first_.chosen);
+  findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
+  if (stopped && status.events) findings.until_ns = status.events->last_ns;
+  findings.session = &status;
+  findings.options = &options;
+  findings.depths = &depths_;
+  append(report.warnings, warningsOf(findings));
   if (status.counts.event_uses > 0 || error_ || stopped) return;
   const bool outside = !status.events && !recording_.rig().cameras.empty() &&
                        (options.interval().t0_ns || options.interval().t1_ns);

@@ -21,6 +21,12 @@
 
 namespace efm {
 
+/// What a first pass found, and the mapping goes on with.
+struct FirstPass {
+  std::vector<ChosenOption> chosen;  ///< The options that were automatic.
+  RecordingStatistics statistics;    ///< Of the events; the mapping adds the poses.
+};
+
 /// Feeds a recording to a mapper sample by sample, with progress on stderr, and keeps what the
 /// report needs. In live operation the recording is played at the speed of the sensor.
 ///
@@ -31,11 +37,9 @@ class MappingRun {
   using Receive = std::function<void(const KeyframeDepthMap&, const MappingRun&)>;
 
   /// @param recording outlives this.
-  /// @param chosen those of the options that were automatic.
   /// @throws std::invalid_argument if the options are not valid.
-  MappingRun(Recording& recording, const EventFusionOptions& options,
-             std::vector<ChosenOption> chosen, Verbosity verbosity, Receive receive,
-             const std::string& activity = "mapping");
+  MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
+             Verbosity verbosity, Receive receive, const std::string& activity = "mapping");
 
   Mapper& mapper() { return *mapper_; }
 
@@ -70,11 +74,10 @@ class MappingRun {
 
   Recording& recording_;
   const EventFusionOptions options_;
-  const std::vector<ChosenOption> chosen_;
+  FirstPass first_;
   const Verbosity verbosity_;
   const Receive receive_;
   StageTimes reading_;
-  RecordingStatistics statistics_;
   DepthStatistics depths_;
   std::exception_ptr receive_error_;
   std::optional<std::string> error_;

@@ -94,29 +94,6 @@ int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t pos
                           poses, out.string()));
 }
 
-std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
-  std::vector<Warning> warnings = counts.warnings;
-  if (counts.lost_packets > 0) {
-    warnings.push_back(
-        {"lost-packets",
-         fmt::format("the recording lacks {} packets of events: their numbers have gaps",
-                     counts.lost_packets)});
-  }
-  if (counts.undated_events > 0) {
-    warnings.push_back(
-        {"undated-events", fmt::format("{} events were left out: the recording does not say their "
-                                       "time or row, at its beginning or after a gap",
-                                       counts.undated_events)});
-  }
-  if (counts.skipped_events > 0) {
-    warnings.push_back(
-        {"skipped-events", fmt::format("{} bad events were left out, the first one found: "
-                                       "{}",
-                                       counts.skipped_events, counts.first_skipped)});
-  }
-  return warnings;
-}
-
 void warnOfLosses(const RecordingCounts& counts) { printWarnings(lossWarnings(counts)); }
 
 }  // namespace efm

@@ -69,10 +69,7 @@ void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& record
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
               const std::filesystem::path& out);
 
-/// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
-/// events that were left out.
-std::vector<Warning> lossWarnings(const RecordingCounts& counts);
-/// Prints them to stderr.
+/// Prints `lossWarnings` to stderr.
 void warnOfLosses(const RecordingCounts& counts);
 
 }  // namespace efm

@@ -16,55 +16,54 @@
 namespace efm {
 namespace {
 
+using Cameras = RecordingStatistics::Cameras;
+using Warnings = std::vector<Warning>;
+
 constexpr std::uint64_t kEnoughEvents = 1000;  // fewer say nothing
 
-void checkBaselines(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+void checkBaselines(const Cameras& cameras, Warnings& warnings) {
   // From a stereo microscope to a train; metres that are really millimetres, and the other way
   // round, are a factor of 1000 off.
   constexpr double kMinBaselineM = 0.005;
   constexpr double kMaxBaselineM = 20;
-  const auto& cameras = recording.cameras();
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
       const double baseline_m = baselineOf(a->second.camera, b->second.camera);
       if (baseline_m >= kMinBaselineM && baseline_m <= kMaxBaselineM) continue;
       if (!isCalibrated(a->second.camera.model)) continue;  // nothing is known of its pose either
-      warnings.push_back(
-          {"baseline",
-           fmt::format("cameras {} and {} are {:g} m apart: expected {:g} to {:g} m; "
-                       "are the translations of the calibration in metres? "
-                       "(--calibration)",
-                       a->first.first, b->first.first, baseline_m, kMinBaselineM, kMaxBaselineM)});
+      addWarning(warnings, "baseline",
+                 "cameras {} and {} are {:g} m apart: expected {:g} to {:g} m; "
+                 "are the translations of the calibration in metres? "
+                 "(--calibration)",
+                 a->first.first, b->first.first, baseline_m, kMinBaselineM, kMaxBaselineM);
     }
   }
 }
 
-void checkFieldOfView(int camera, const CameraModel& model, std::vector<Warning>& warnings) {
+void checkFieldOfView(int camera, const CameraModel& model, Warnings& warnings) {
   // A telescope, and the limit of a pinhole image. A fisheye lens sees up to 220 degrees.
   constexpr double kMinDeg = 5;
   const double max_deg = model.distortion == DistortionModel::kEquidistant ? 220 : 170;
   const double view_deg = fieldOfView(model).x() / kRadiansPerDegree;
   if (view_deg >= kMinDeg && view_deg <= max_deg) return;
-  warnings.push_back(
-      {"focal-length",
-       fmt::format("camera {}: a focal length of {:g} px and {} columns are a field of view of "
-                   "{:.3g} degrees: expected {:g} to {:g}; is the calibration in pixels, and of "
-                   "this resolution? (--calibration)",
-                   camera, model.fx, model.width, view_deg, kMinDeg, max_deg)});
+  addWarning(warnings, "focal-length",
+             "camera {}: a focal length of {:g} px and {} columns are a field of view of "
+             "{:.3g} degrees: expected {:g} to {:g}; is the calibration in pixels, and of "
+             "this resolution? (--calibration)",
+             camera, model.fx, model.width, view_deg, kMinDeg, max_deg);
 }
 
-void checkPrincipalPoint(int camera, const CameraModel& model, std::vector<Warning>& warnings) {
+void checkPrincipalPoint(int camera, const CameraModel& model, Warnings& warnings) {
   // Lenses are mounted within a few per cent of the centre; a cut-out of a sensor reaches further.
   const auto in_middle = [](double center, int size) {
     return center >= 0.25 * size && center <= 0.75 * size;
   };
   if (in_middle(model.cx, model.width) && in_middle(model.cy, model.height)) return;
-  warnings.push_back(
-      {"principal-point",
-       fmt::format("camera {}: the principal point ({:g}, {:g}) lies outside the middle half of "
-                   "the {}x{} pixels; is the calibration of this resolution, and in the order fx "
-                   "fy cx cy? (--calibration)",
-                   camera, model.cx, model.cy, model.width, model.height)});
+  addWarning(warnings, "principal-point",
+             "camera {}: the principal point ({:g}, {:g}) lies outside the middle half of "
+             "the {}x{} pixels; is the calibration of this resolution, and in the order fx "
+             "fy cx cy? (--calibration)",
+             camera, model.cx, model.cy, model.width, model.height);
 }
 
 /// The fraction of a grid's pixels without a viewing ray.
@@ -82,39 +81,39 @@ double fractionWithoutRay(const CameraModel& model) {
   return static_cast<double>(without) / (kGrid * kGrid);
 }
 
-void checkLens(int camera, const CameraModel& model, std::vector<Warning>& warnings) {
+void checkLens(int camera, const CameraModel& model, Warnings& warnings) {
   constexpr double kMaxFraction = 0.05;  // the corners of a wide lens may have no ray
   const double fraction = fractionWithoutRay(model);
   if (fraction <= kMaxFraction) return;
-  warnings.push_back(
-      {"lens",
-       fmt::format("camera {}: the lens model has no viewing ray for {:.0f} % of the pixels; are "
-                   "the coefficients in the order of the model '{}'? (--calibration)",
-                   camera, 100 * fraction, nameOf(model.distortion))});
+  addWarning(warnings, "lens",
+             "camera {}: the lens model has no viewing ray for {:.0f} % of the pixels; are "
+             "the coefficients in the order of the model '{}'? (--calibration)",
+             camera, 100 * fraction, nameOf(model.distortion));
 }
 
-void checkActivity(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+void checkActivity(const Cameras& cameras, Warnings& warnings) {
   std::uint64_t most = 0;
-  for (const auto& [key, camera] : recording.cameras()) most = std::max(most, camera.events.count);
-  for (const auto& [key, camera] : recording.cameras()) {
+  for (const auto& [key, camera] : cameras) most = std::max(most, camera.events.count);
+  for (const auto& [key, camera] : cameras) {
     const std::uint64_t count = camera.events.count;
     if (count == 0 && most > 0) {
-      warnings.push_back({"silent-camera", fmt::format("camera {} has no event; [rig] cameras "
-                                                       "leaves it out",
-                                                       key.first)});
+      addWarning(warnings, "silent-camera",
+                 "camera {} has no event; [rig] cameras "
+                 "leaves it out",
+                 key.first);
     } else if (most >= kEnoughEvents &&
                count < most / 10) {  // equal cameras differ by a factor of 2
-      warnings.push_back(
-          {"few-events", fmt::format("camera {} has {} events, another one {}: is its lens covered "
-                                     "or its sensitivity lower? ([rig] cameras leaves it out)",
-                                     key.first, count, most)});
+      addWarning(warnings, "few-events",
+                 "camera {} has {} events, another one {}: is its lens covered "
+                 "or its sensitivity lower? ([rig] cameras leaves it out)",
+                 key.first, count, most);
     }
     if (count >= kEnoughEvents && (camera.positive == 0 || camera.positive == count)) {
-      warnings.push_back(
-          {"polarity", fmt::format("all {} events of camera {} have the polarity {}: is it the "
-                                   "right column? (--event-columns; [fusion] split_polarity = "
-                                   "false does without)",
-                                   count, key.first, camera.positive == 0 ? 0 : 1)});
+      addWarning(warnings, "polarity",
+                 "all {} events of camera {} have the polarity {}: is it the "
+                 "right column? (--event-columns; [fusion] split_polarity = "
+                 "false does without)",
+                 count, key.first, camera.positive == 0 ? 0 : 1);
     }
   }
 }
@@ -128,20 +127,19 @@ double fractionOfBusiest(const CameraStatistics& camera) {
   return static_cast<double>(events) / static_cast<double>(camera.events.count);
 }
 
-void checkHotPixels(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
   // Edges sweep over most of the image. One hot pixel among the others' events is for the filter.
   constexpr double kMaxFraction = 0.9;
-  for (const auto& [key, camera] : recording.cameras()) {
+  for (const auto& [key, camera] : cameras) {
     // With fewer events, 1 % of the pixels may have them all by chance.
     if (camera.pixels.empty() || camera.events.count < camera.pixels.size() / 10) continue;
     const double fraction = fractionOfBusiest(camera);
     if (fraction <= kMaxFraction) continue;
-    warnings.push_back(
-        {"hot-pixels",
-         fmt::format("{:.0f} % of the events of camera {} come from 1 % of its pixels: hot pixels, "
-                     "a blinking light or a wrong column ([filter] hot_pixel_ratio, "
-                     "--event-columns)",
-                     100 * fraction, key.first)});
+    addWarning(warnings, "hot-pixels",
+               "{:.0f} % of the events of camera {} come from 1 % of its pixels: hot pixels, "
+               "a blinking light or a wrong column ([filter] hot_pixel_ratio, "
+               "--event-columns)",
+               100 * fraction, key.first);
   }
 }
 
@@ -191,10 +189,10 @@ std::pair<std::size_t, std::size_t> linesInside(std::vector<double> lines) {
   return {first, lines.size() - 1 - linesOutside(lines)};
 }
 
-void checkSensorArea(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+void checkSensorArea(const Cameras& cameras, Warnings& warnings) {
   // Of the pixels of the area. With fewer, the events are of some edges of the scene alone.
   constexpr double kMinActive = 0.2;
-  for (const auto& [key, camera] : recording.cameras()) {
+  for (const auto& [key, camera] : cameras) {
     std::vector<std::uint32_t> active;
     for (const std::uint32_t events : camera.pixels) {
       if (events > 0) active.push_back(events);
@@ -209,22 +207,19 @@ void checkSensorArea(const RecordingStatistics& recording, std::vector<Warning>&
     if (area == camera.pixels.size()) continue;
     if (static_cast<double>(active.size()) < kMinActive * static_cast<double>(area)) continue;
     const CameraModel& model = camera.camera.model;
-    warnings.push_back(
-        {"sensor-area",
-         fmt::format(
-             "camera {} has events in columns {} to {} of 0 to {} and rows {} to {} of 0 to "
-             "{} alone: are its pictures cropped, or its pixels binned? The calibration "
-             "must be of the pixels that the events have: the resolution, and cx and cy "
-             "less by an offset that was cut off (--calibration)",
-             key.first, left, right, model.width - 1, top, bottom, model.height - 1)});
+    addWarning(warnings, "sensor-area",
+               "camera {} has events in columns {} to {} of 0 to {} and rows {} to {} of 0 to "
+               "{} alone: are its pictures cropped, or its pixels binned? The calibration "
+               "must be of the pixels that the events have: the resolution, and cx and cy "
+               "less by an offset that was cut off (--calibration)",
+               key.first, left, right, model.width - 1, top, bottom, model.height - 1);
   }
 }
 
-void checkCameraClocks(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+void checkCameraClocks(const Cameras& cameras, Warnings& warnings) {
   // Cameras of a rig are started together. Where they share less than half of the time of the
   // shorter stream, their clocks have another zero, or the files are of two recordings.
   constexpr double kMinShared = 0.5;
-  const auto& cameras = recording.cameras();
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
       const StreamStatistics& one = a->second.events;
@@ -234,51 +229,47 @@ void checkCameraClocks(const RecordingStatistics& recording, std::vector<Warning
       const std::int64_t end_ns = std::min(*one.last_ns, *other.last_ns);
       const double shorter_s = std::min(one.seconds(), other.seconds());
       if (secondsBetween(begin_ns, end_ns) >= kMinShared * shorter_s) continue;
-      warnings.push_back(
-          {"camera-clocks",
-           fmt::format("camera {} has events from {} to {} s, camera {} from {} to {} s: have they "
-                       "one clock, and are they of one recording? ([rig] time_offsets_s)",
-                       a->first.first, formatSeconds(*one.first_ns), formatSeconds(*one.last_ns),
-                       b->first.first, formatSeconds(*other.first_ns),
-                       formatSeconds(*other.last_ns))});
+      addWarning(warnings, "camera-clocks",
+                 "camera {} has events from {} to {} s, camera {} from {} to {} s: have they "
+                 "one clock, and are they of one recording? ([rig] time_offsets_s)",
+                 a->first.first, formatSeconds(*one.first_ns), formatSeconds(*one.last_ns),
+                 b->first.first, formatSeconds(*other.first_ns), formatSeconds(*other.last_ns));
     }
   }
 }
 
-void checkTwins(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
-  const auto& cameras = recording.cameras();
+void checkTwins(const Cameras& cameras, Warnings& warnings) {
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
       const CameraStatistics& one = a->second;
       const CameraStatistics& other = b->second;
       if (one.events.count < kEnoughEvents || one.pixels.empty()) continue;
       if (one.positive != other.positive || one.pixels != other.pixels) continue;
-      warnings.push_back(
-          {"same-events", fmt::format("cameras {} and {} have the same events in every pixel: is "
-                                      "one file given twice?",
-                                      a->first.first, b->first.first)});
+      addWarning(warnings, "same-events",
+                 "cameras {} and {} have the same events in every pixel: is "
+                 "one file given twice?",
+                 a->first.first, b->first.first);
     }
   }
 }
 
 }  // namespace
 
-std::vector<Warning> cameraWarnings(const RecordingStatistics& recording) {
-  std::vector<Warning> warnings;
-  checkBaselines(recording, warnings);
-  for (const auto& [key, camera] : recording.cameras()) {
+void checkCameras(const Findings& findings, Warnings& warnings) {
+  const Cameras& cameras = findings.recording.cameras();
+  checkBaselines(cameras, warnings);
+  for (const auto& [key, camera] : cameras) {
     const CameraModel& model = camera.camera.model;
     if (!isCalibrated(model)) continue;
     checkFieldOfView(key.first, model, warnings);
     checkPrincipalPoint(key.first, model, warnings);
     checkLens(key.first, model, warnings);
   }
-  checkActivity(recording, warnings);
-  checkHotPixels(recording, warnings);
-  checkSensorArea(recording, warnings);
-  checkCameraClocks(recording, warnings);
-  checkTwins(recording, warnings);
-  return warnings;
+  checkActivity(cameras, warnings);
+  checkHotPixels(cameras, warnings);
+  checkSensorArea(cameras, warnings);
+  checkCameraClocks(cameras, warnings);
+  checkTwins(cameras, warnings);
 }
 
 }  // namespace efm

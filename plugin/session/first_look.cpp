@@ -51,11 +51,10 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
   constexpr double kMaxLeverM = 20;
   PoseVerdict verdict;
   if (lever_m > kMaxLeverM) {  // what follows from it would blame the poses
-    verdict.warnings.push_back(
-        {"long-lever",
-         fmt::format("the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
-                     "translation of T_body_rig in metres (--hand-eye)?",
-                     lever_m, kMaxLeverM)});
+    addWarning(verdict.warnings, "long-lever",
+               "the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
+               "translation of T_body_rig in metres (--hand-eye)?",
+               lever_m, kMaxLeverM);
     return verdict;
   }
   try {
@@ -140,14 +139,23 @@ void FirstLook::completeRig() {
 void FirstLook::takeWindows() {
   if (!rig_.isComplete()) return;
   while (const std::optional<WindowData> data = mapper_.window()) {
-    take(*data);
+    keep(*data);
     mapper_.skipWindow(data->window);
   }
 }
 
-void FirstLook::take(const WindowData& data) {
+void FirstLook::keep(const WindowData& data) {
   samples_.add(data);
   most_events_per_s_ = std::max(most_events_per_s_, eventRate(data));
+}
+
+bool FirstLook::take(const Sample& sample) {
+  try {
+    if (takes_) add(sample);
+  } catch (const std::exception&) {
+    takes_ = false;
+  }
+  return takes_;
 }
 
 RecordingSurvey FirstLook::finish() {
@@ -157,7 +165,7 @@ RecordingSurvey FirstLook::finish() {
     completeRig();
     rig_.requireNoneWaits();
     if (samples_.samples().empty()) {
-      if (const std::optional<WindowData> rest = mapper_.window()) take(*rest);
+      if (const std::optional<WindowData> rest = mapper_.window()) keep(*rest);
     }
   } catch (const std::exception&) {  // the pass that maps reports it
   }

@@ -52,6 +52,9 @@ class FirstLook {
   void add(const Sample& sample);
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
+  /// Adds a sample, unless a MappingSession rejects it or rejected an earlier one.
+  /// @return whether all samples so far were added.
+  bool take(const Sample& sample);
   /// To be called once: after the last data, or after an error.
   RecordingSurvey finish();
 
@@ -60,13 +63,14 @@ class FirstLook {
   void usePoses(const std::vector<StampedPose>& poses);
   void completeRig();
   void takeWindows();
-  void take(const WindowData& data);
+  void keep(const WindowData& data);
 
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   SpreadSamples samples_;
   std::optional<TimeSpan> events_, poses_;  // that the mapper took
+  bool takes_ = true;
   std::uint64_t received_ = 0;
   double lever_m_ = 0;
   double most_events_per_s_ = 0;  // of those that were chosen

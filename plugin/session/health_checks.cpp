@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
@@ -28,21 +29,19 @@ namespace {
 
 using Warnings = std::vector<Warning>;
 
-using ClockSpan = std::pair<std::int64_t, std::int64_t>;
-
 /// Whether the poses would cover the events if the events' times were `factor` times larger. Almost
 /// nothing among the poses is no fit, but chance.
-bool fitsWith(double factor, const ClockSpan& events, const ClockSpan& poses) {
-  const double first = factor * static_cast<double>(events.first);
-  const double last = factor * static_cast<double>(events.second);
-  const double begin = std::max(first, static_cast<double>(poses.first));
-  const double end = std::min(last, static_cast<double>(poses.second));
-  const auto poses_ns = static_cast<double>(poses.second - poses.first);
+bool fitsWith(double factor, const TimeSpan& events, const TimeSpan& poses) {
+  const double first = factor * static_cast<double>(events.first_ns);
+  const double last = factor * static_cast<double>(events.last_ns);
+  const double begin = std::max(first, static_cast<double>(poses.first_ns));
+  const double end = std::min(last, static_cast<double>(poses.last_ns));
+  const auto poses_ns = static_cast<double>(poses.last_ns - poses.first_ns);
   return end - begin > 0.5 * (last - first) && last - first > 0.1 * poses_ns;
 }
 
 /// The unit of either that would let both fit; else a question.
-std::string clockGuess(const ClockSpan& events, const ClockSpan& poses) {
+std::string clockGuess(const TimeSpan& events, const TimeSpan& poses) {
   double factor = 1;
   for (const char* unit : {"ms", "us", "ns"}) {
     factor /= 1000;
@@ -57,108 +56,128 @@ std::string clockGuess(const ClockSpan& events, const ClockSpan& poses) {
   return "have they one clock and one unit?";
 }
 
-void checkClocks(const RecordingStatistics& recording, Warnings& warnings) {
+void checkClocks(const Findings& findings, Warnings& warnings) {
   // Trackers start late; in a recording of a second that is a large fraction. Another clock or
   // another unit leaves nothing.
   constexpr double kMinOverlap = 0.9;
   constexpr double kStartS = 0.1;
-  const double overlap = recording.overlap();
+  const auto events = findings.events();
+  const PoseStatistics* const used = findings.recording.usedPoses();
+  if (!events || !used) return;
+  const TimeSpan poses = {*used->poses.first_ns, *used->poses.last_ns};
+  const double overlap = overlapOf(*events, poses);
   if (overlap >= kMinOverlap) return;
-  const auto span = *recording.eventSpan();
-  const double uncovered_s = (1 - overlap) * secondsBetween(span.first, span.second);
+  const double uncovered_s = (1 - overlap) * secondsBetween(events->first_ns, events->last_ns);
   if (overlap > 0 && uncovered_s < kStartS) return;
-  const StreamStatistics& poses = recording.usedPoses()->poses;
-  warnings.push_back(
-      {"clock-overlap",
-       fmt::format("the poses cover {:.1f} % of the events' time: events from {}, poses "
-                   "from {}; {} (--poses, --time-unit, [rig] time_offsets_s)",
-                   100 * overlap, timeText(span.first, span.second, span.first),
-                   timeText(*poses.first_ns, *poses.last_ns, span.first),
-                   clockGuess(span, {*poses.first_ns, *poses.last_ns}))});
+  addWarning(warnings, "clock-overlap",
+             "the poses cover {:.1f} % of the events' time: events from {}, poses from {}; {} "
+             "(--poses, --time-unit, [rig] time_offsets_s)",
+             100 * overlap, timeText(events->first_ns, events->last_ns, events->first_ns),
+             timeText(poses.first_ns, poses.last_ns, events->first_ns), clockGuess(*events, poses));
 }
 
-void checkPoseGap(const RecordingStatistics& recording, double max_gap_s, Warnings& warnings) {
-  const auto span = recording.eventSpan();
-  const PoseStatistics* const used = recording.usedPoses();
-  if (!span || !used) return;
+void checkPoseGap(const Findings& findings, Warnings& warnings) {
+  const auto events = findings.events();
+  const PoseStatistics* const used = findings.recording.usedPoses();
+  if (!events || !used) return;
   const std::int64_t start_ns = used->poses.max_gap_start_ns;
   const std::int64_t end_ns = start_ns + used->poses.max_gap_ns;
-  const bool matters = start_ns < span->second && end_ns > span->first;
-  if (!matters || secondsBetween(start_ns, end_ns) <= max_gap_s) return;
-  warnings.push_back(
-      {"pose-gap",
-       fmt::format("the largest gap between two poses is {:g} s, after {}: events in gaps of "
-                   "more than {:g} s are not used ([rig] max_pose_gap_s)",
-                   secondsBetween(start_ns, end_ns), timeText(start_ns, span->first), max_gap_s)});
+  const bool matters = start_ns < events->last_ns && end_ns > events->first_ns;
+  if (!matters || secondsBetween(start_ns, end_ns) <= findings.max_pose_gap_s) return;
+  addWarning(warnings, "pose-gap",
+             "the largest gap between two poses is {:g} s, after {}: events in gaps of more than "
+             "{:g} s are not used ([rig] max_pose_gap_s)",
+             secondsBetween(start_ns, end_ns), timeText(start_ns, events->first_ns),
+             findings.max_pose_gap_s);
 }
 
-void checkMotion(const PoseStatistics& poses, double near_depth_m, Warnings& warnings) {
+void checkShift(const Findings& findings, Warnings& warnings) {
   // Depth comes from parallax: at 1 % of the depth, a typical camera sees a point move by 2 to 5
   // pixels.
   constexpr double kMinShift = 0.01;
   // A slower rotation is the sway of a still camera.
   constexpr double kMinRotation = 1 * kRadiansPerDegree;
-  if (poses.poses.count < 2 || poses.max_shift_m >= kMinShift * near_depth_m) return;
-  const bool rotates = poses.max_rotation_rad >= kMinRotation;
-  warnings.push_back(
-      {rotates ? "rotation-only" : "no-motion",
-       fmt::format("the poses move by at most {:g} m and {:.3g} degrees within a window: depth "
-                   "needs a shift of {:g} m or more for points at {:g} m; are the positions in "
-                   "metres? (--poses, [keyframes] window_s, [dsi] min_depth_m)",
-                   poses.max_shift_m, poses.max_rotation_rad / kRadiansPerDegree,
-                   kMinShift * near_depth_m, near_depth_m)});
+  const PoseStatistics* const used = findings.recording.usedPoses();
+  const double min_shift_m = kMinShift * findings.near_depth_m;
+  if (!used || used->poses.count < 2 || used->max_shift_m >= min_shift_m) return;
+  addWarning(warnings, used->max_rotation_rad >= kMinRotation ? "rotation-only" : "no-motion",
+             "the poses move by at most {:g} m and {:.3g} degrees within a window: depth needs a "
+             "shift of {:g} m or more for points at {:g} m; are the positions in metres? (--poses, "
+             "[keyframes] window_s, [dsi] min_depth_m)",
+             used->max_shift_m, used->max_rotation_rad / kRadiansPerDegree, min_shift_m,
+             findings.near_depth_m);
 }
 
-void checkSpeeds(const PoseStatistics& poses, Warnings& warnings) {
+void checkSpeeds(const Findings& findings, Warnings& warnings) {
   constexpr double kMaxSpeed = 50;     // m/s: 180 km/h
   constexpr double kMaxRotation = 20;  // rad/s: three turns a second; gyroscopes end at 35
-  if (poses.max_speed > kMaxSpeed) {
-    warnings.push_back(
-        {"speed", fmt::format("the poses move at up to {:.3g} m/s: expected at most {:g}; are "
-                              "positions in metres, times in seconds and the columns in order? Or "
-                              "the tracker jumps (--poses)",
-                              poses.max_speed, kMaxSpeed)});
+  const PoseStatistics* const used = findings.recording.usedPoses();
+  if (!used) return;
+  if (used->max_speed > kMaxSpeed) {
+    addWarning(warnings, "speed",
+               "the poses move at up to {:.3g} m/s: expected at most {:g}; are "
+               "positions in metres, times in seconds and the columns in order? Or "
+               "the tracker jumps (--poses)",
+               used->max_speed, kMaxSpeed);
   }
-  if (poses.max_rotation_rate > kMaxRotation) {
-    warnings.push_back(
-        {"rotation-rate",
-         fmt::format("the poses rotate at up to {:.3g} rad/s: expected at most {:g}; is the order "
-                     "of the quaternion qx qy qz qw, and are times in seconds? (--poses)",
-                     poses.max_rotation_rate, kMaxRotation)});
+  if (used->max_rotation_rate > kMaxRotation) {
+    addWarning(warnings, "rotation-rate",
+               "the poses rotate at up to {:.3g} rad/s: expected at most {:g}; is the order "
+               "of the quaternion qx qy qz qw, and are times in seconds? (--poses)",
+               used->max_rotation_rate, kMaxRotation);
   }
 }
+
+/// Without the parts that are missing, a map ends with an error.
+void checkParts(const Findings& findings, Warnings& warnings) {
+  if (findings.session) return;
+  std::map<int, CameraModel> cameras;
+  for (const auto& [key, camera] : findings.recording.cameras()) {
+    cameras.emplace(key.first, camera.camera.model);
+  }
+  warnings = missingParts(cameras, findings.events().has_value(),
+                          findings.recording.usedPoses() != nullptr);
+}
+
+template <typename Value>
+void append(std::vector<Value>& all, std::vector<Value> more) {
+  std::move(more.begin(), more.end(), std::back_inserter(all));
+}
+
+void checkDepths(const Findings& findings, Warnings& warnings) {
+  if (findings.depths) append(warnings, findings.depths->warnings());
+}
+
+void checkReading(const Findings& findings, Warnings& warnings) {
+  append(warnings, lossWarnings(findings.read));
+}
+
+using Check = void (*)(const Findings&, Warnings&);
+
+constexpr Check kChecks[] = {checkParts,  checkCameras, checkClocks, checkPoseGap, checkShift,
+                             checkSpeeds, checkMotion,  checkDepths, checkSession, checkReading};
 
 }  // namespace
 
-std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
-                                    const HealthLimits& limits) {
-  Warnings warnings = cameraWarnings(recording);
-  checkClocks(recording, warnings);
-  checkPoseGap(recording, limits.max_pose_gap_s, warnings);
-  if (const PoseStatistics* const poses = recording.usedPoses()) {
-    checkMotion(*poses, limits.near_depth_m, warnings);
-    checkSpeeds(*poses, warnings);
-    const double middle_depth_m = 2 / (1 / limits.near_depth_m + 1 / limits.far_depth_m);
-    for (Warning& warning : motionWarnings(recording, middle_depth_m, limits.max_pose_gap_s)) {
-      warnings.push_back(std::move(warning));
-    }
-  }
-  return warnings;
-}
-
-double motionDepth(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen) {
+void Findings::use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen) {
   const bool is_chosen = std::any_of(chosen.begin(), chosen.end(), [](const ChosenOption& option) {
     return option.key == "min_depth_m";
   });
-  return is_chosen ? std::max(planes.min_depth_m, HealthLimits{}.near_depth_m) : planes.min_depth_m;
+  // A nearer limit that was chosen may follow from wrong poses.
+  near_depth_m = is_chosen ? std::max(planes.min_depth_m, near_depth_m) : planes.min_depth_m;
+  far_depth_m = planes.max_depth_m;
 }
 
-std::vector<Warning> missingParts(const RecordingStatistics& recording) {
-  std::map<int, CameraModel> cameras;
-  for (const auto& [key, camera] : recording.cameras()) {
-    cameras.emplace(key.first, camera.camera.model);
-  }
-  return missingParts(cameras, recording.eventSpan().has_value(), recording.usedPoses() != nullptr);
+std::optional<TimeSpan> Findings::events() const {
+  std::optional<TimeSpan> events = recording.eventSpan();
+  if (events) events->last_ns = std::min(events->last_ns, until_ns);
+  return events;
+}
+
+std::vector<Warning> warningsOf(const Findings& findings) {
+  Warnings warnings;
+  for (const Check check : kChecks) check(findings, warnings);
+  return warnings;
 }
 
 std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
@@ -167,11 +186,30 @@ std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, boo
   if (!has_events) warnings.push_back({"no-events", "there are no events"});
   for (const auto& [index, model] : cameras) {
     if (isCalibrated(model)) continue;
-    warnings.push_back(
-        {"no-calibration",
-         fmt::format("camera {} has no calibration: a map needs --calibration", index)});
+    addWarning(warnings, "no-calibration",
+               "camera {} has no calibration: a map needs --calibration", index);
   }
   if (!has_poses) warnings.push_back({"no-poses", "there are no poses: a map needs --poses"});
+  return warnings;
+}
+
+std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
+  Warnings warnings = counts.warnings;
+  if (counts.lost_packets > 0) {
+    addWarning(warnings, "lost-packets",
+               "the recording lacks {} packets of events: their numbers have gaps",
+               counts.lost_packets);
+  }
+  if (counts.undated_events > 0) {
+    addWarning(warnings, "undated-events",
+               "{} events were left out: the recording does not say their time or row, at its "
+               "beginning or after a gap",
+               counts.undated_events);
+  }
+  if (counts.skipped_events > 0) {
+    addWarning(warnings, "skipped-events", "{} bad events were left out, the first one found: {}",
+               counts.skipped_events, counts.first_skipped);
+  }
   return warnings;
 }
 
@@ -284,10 +322,10 @@ std::vector<Warning> DepthStatistics::warnings() const {
                                       "auto chose it, because {}; where the scene goes on "
                                       "beyond it, [dsi] {} sets another one",
                                       chosen->reason, key);
-    warnings.push_back({"depths-at-limit",
-                        fmt::format("{:.0f} % of the depths lie at the {} plane, {:g} m: {}, or "
-                                    "calibration and poses do not explain the events",
-                                    100 * fraction, which, limit_m, why)});
+    addWarning(warnings, "depths-at-limit",
+               "{:.0f} % of the depths lie at the {} plane, {:g} m: {}, or "
+               "calibration and poses do not explain the events",
+               100 * fraction, which, limit_m, why);
   };
   check(nearest_, "nearest", planes_.min_depth_m, "min_depth_m");
   check(farthest_, "farthest", planes_.max_depth_m, "max_depth_m");

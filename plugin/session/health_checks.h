@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fmt/core.h>
 #include <Eigen/Core>
 
 #include <cstdint>
@@ -35,27 +36,6 @@ Eigen::Vector2d fieldOfView(const CameraModel& model);
 /// Distance of two cameras on the rig, metres.
 double baselineOf(const RigCamera& a, const RigCamera& b);
 
-/// What is compared with the options of a map; without a map, the defaults serve.
-struct HealthLimits {
-  double near_depth_m = 0.5;
-  double far_depth_m = 5;
-  double max_pose_gap_s = 0.25;
-};
-
-/// The nearest depth that the motion is compared with, metres: a chosen one may follow from wrong
-/// poses.
-double motionDepth(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);
-
-/// Checks the calibration, the clocks, the motion and the events of a recording.
-std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
-                                    const HealthLimits& limits);
-
-/// What a recording lacks for a map: events, calibration, poses.
-std::vector<Warning> missingParts(const RecordingStatistics& recording);
-/// @param cameras by their index.
-std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
-                                  bool has_poses);
-
 /// Counts what became of the pixels of keyframes, and depths near the limits.
 class DepthStatistics {
  public:
@@ -84,22 +64,55 @@ class DepthStatistics {
   std::uint64_t farthest_ = 0;  // near the farthest plane
 };
 
-/// What is implausible about the cameras: their calibration, and their events. A part of
-/// `healthWarnings`.
-std::vector<Warning> cameraWarnings(const RecordingStatistics& recording);
+/// What is known of a recording and, after it was mapped, of its map.
+struct Findings {
+  const RecordingStatistics& recording;
+  RecordingCounts read;
+  std::int64_t until_ns = kMaxTimeNs;  ///< The recording was read until this time.
+  double near_depth_m = 0.5;           ///< The nearest depth that the motion is compared with.
+  double far_depth_m = 5;
+  double max_pose_gap_s = 0.25;  ///< Events in longer gaps are not used.
 
+  // After the mapping; otherwise null.
+  const SessionStatus* session = nullptr;
+  const FusionMapperOptions* options = nullptr;
+  const DepthStatistics* depths = nullptr;
+
+  /// With the depths that a map uses.
+  void use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);
+  /// First and last event of all cameras.
+  std::optional<TimeSpan> events() const;
+};
+
+/// All warnings about a recording and its map: the one function for each program.
+std::vector<Warning> warningsOf(const Findings& findings);
+
+/// Adds a warning: its name, and its text in fmt's format.
+template <typename... Values>
+void addWarning(std::vector<Warning>& warnings, const char* name,
+                fmt::format_string<Values...> text, Values&&... values) {
+  warnings.push_back({name, fmt::format(text, std::forward<Values>(values)...)});
+}
+
+// The parts of `warningsOf`, in files of their own.
+
+/// What is implausible about the cameras: their calibration, and their events.
+void checkCameras(const Findings& findings, std::vector<Warning>& warnings);
 /// What is implausible about the motion of the poses beside the events: poses that repeat
 /// (`poses-frozen`), steps that the tracker otherwise does not make (`pose-jump`), and motion that
-/// is interpolated over more than 0.1 s (`pose-interpolation`). A part of `healthWarnings`.
-/// Nothing without poses, events or a calibrated camera.
-/// @param depth_m at which motion is seen: a middle one of the scene.
-/// @param max_pose_gap_s events in longer gaps are not used.
-std::vector<Warning> motionWarnings(const RecordingStatistics& recording, double depth_m,
-                                    double max_pose_gap_s);
-
+/// is interpolated over more than 0.1 s (`pose-interpolation`).
+void checkMotion(const Findings& findings, std::vector<Warning>& warnings);
 /// What a finished session did not use, and where its map has holes.
-std::vector<Warning> sessionWarnings(const SessionStatus& status,
-                                     const FusionMapperOptions& options);
+void checkSession(const Findings& findings, std::vector<Warning>& warnings);
+
+/// The parts that a recording lacks for a map: events, calibration, poses.
+/// @param cameras by their index.
+std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
+                                  bool has_poses);
+
+/// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
+/// events that were left out.
+std::vector<Warning> lossWarnings(const RecordingCounts& counts);
 
 /// Automatic options were chosen without a scene.
 Warning noSceneWarning();

@@ -14,23 +14,24 @@ namespace {
 
 class MotionChecks {
  public:
-  MotionChecks(const RecordingStatistics& recording, double depth_m, double max_gap_s)
-      : recording_(recording), depth_m_(depth_m), max_gap_s_(max_gap_s) {
-    for (const auto& [key, camera] : recording.cameras()) {
+  MotionChecks(const Findings& findings, std::vector<Warning>& warnings)
+      : recording_(findings.recording),
+        depth_m_(2 / (1 / findings.near_depth_m + 1 / findings.far_depth_m)),
+        max_gap_s_(findings.max_pose_gap_s),
+        warnings_(warnings) {
+    for (const auto& [key, camera] : recording_.cameras()) {
       if (isCalibrated(camera.camera.model))
         focal_px_ = std::max(focal_px_, camera.camera.model.fx);
     }
-    const auto span = recording.eventSpan();
-    if (span) events_ = {span->first, span->second};
-    if (const PoseStatistics* poses = recording.usedPoses()) motion_ = poses->motion.completed();
+    if (const auto events = findings.events()) events_ = {events->first_ns, events->last_ns};
+    if (const PoseStatistics* poses = recording_.usedPoses()) motion_ = poses->motion.completed();
   }
 
-  std::vector<Warning> run() {
-    if (focal_px_ <= 0 || events_.t1_ns <= events_.t0_ns) return {};
+  void run() {
+    if (focal_px_ <= 0 || events_.t1_ns <= events_.t0_ns) return;
     checkHolds();
     checkGaps();
     checkSteps();
-    return std::move(warnings_);
   }
 
  private:
@@ -106,16 +107,14 @@ class MotionChecks {
     }
     if (count == 0) return;
     const double hold_s = secondsBetween(longest.t0_ns, longest.t1_ns);
-    warnings_.push_back(
-        {"poses-frozen",
-         fmt::format(
-             "the poses repeat{} for {:.3g} s, after {}, while events come at {:.0f} % of their "
-             "mean rate: at the speed {} it the image moves by {:.3g} pixels in this time; does "
-             "the tracker hang? Take the repeated poses out (--poses): events in gaps over "
-             "max_pose_gap_s are not used",
-             timesText(count, "longest"), hold_s, startOf(longest),
-             100 * eventRate(longest) / eventRate(events_),
-             longest.speed_after ? "after" : "before", pixels(longest.speed) * hold_s)});
+    addWarning(warnings_, "poses-frozen",
+               "the poses repeat{} for {:.3g} s, after {}, while events come at {:.0f} % of their "
+               "mean rate: at the speed {} it the image moves by {:.3g} pixels in this time; does "
+               "the tracker hang? Take the repeated poses out (--poses): events in gaps over "
+               "max_pose_gap_s are not used",
+               timesText(count, "longest"), hold_s, startOf(longest),
+               100 * eventRate(longest) / eventRate(events_),
+               longest.speed_after ? "after" : "before", pixels(longest.speed) * hold_s);
   }
 
   void checkGaps() {
@@ -134,15 +133,13 @@ class MotionChecks {
       if (pixels(gap.missed) > pixels(worst.missed)) worst = gap;
     }
     if (count == 0) return;
-    warnings_.push_back(
-        {"pose-interpolation",
-         fmt::format(
-             "poses are {:.3g} s apart{}, after {}: the image moves by {:.3g} pixels meanwhile, "
-             "and "
-             "straight interpolation misses some {:.2g} of them; a pose at least every 0.1 s is "
-             "needed (--poses), or --set rig.max_pose_gap_s=0.1 leaves these events out",
-             secondsBetween(worst.t0_ns, worst.t1_ns), timesText(count, "worst"), startOf(worst),
-             pixels(worst.moved), pixels(worst.missed))});
+    addWarning(warnings_, "pose-interpolation",
+               "poses are {:.3g} s apart{}, after {}: the image moves by {:.3g} pixels meanwhile, "
+               "and "
+               "straight interpolation misses some {:.2g} of them; a pose at least every 0.1 s is "
+               "needed (--poses), or --set rig.max_pose_gap_s=0.1 leaves these events out",
+               secondsBetween(worst.t0_ns, worst.t1_ns), timesText(count, "worst"), startOf(worst),
+               pixels(worst.moved), pixels(worst.missed));
   }
 
   /// The deviation of most steps, and of all that are no jumps by far: nothing where there are too
@@ -202,33 +199,30 @@ class MotionChecks {
     if (jumps.count == 0) return;
     const double per_unit = turned ? 1 / kRadiansPerDegree : 1;
     const char* const unit = turned ? "degrees" : "m";
-    warnings_.push_back(
-        {"pose-jump",
-         fmt::format(
-             "the poses jump by {:.3g} {} after {}{}: {:.3g} pixels, at {:.3g} {}/s beside "
-             "the motion before and after, where {:.2g} are usual; a loop closure or a "
-             "lost tracker? What is mapped before and after does not fit together: give a "
-             "trajectory that was optimised as a whole (--poses), or map both parts apart "
-             "(--t0, --t1)",
-             per_unit * sizeOf(jumps.largest), unit, startOf(jumps.largest),
-             jumps.count > 1 ? fmt::format(", the largest of {}", jumps.count) : std::string(),
-             jumps.pixels, per_unit * jumps.largest.deviation, unit, per_unit * jumps.usual)});
+    addWarning(warnings_, "pose-jump",
+               "the poses jump by {:.3g} {} after {}{}: {:.3g} pixels, at {:.3g} {}/s beside "
+               "the motion before and after, where {:.2g} are usual; a loop closure or a "
+               "lost tracker? What is mapped before and after does not fit together: give a "
+               "trajectory that was optimised as a whole (--poses), or map both parts apart "
+               "(--t0, --t1)",
+               per_unit * sizeOf(jumps.largest), unit, startOf(jumps.largest),
+               jumps.count > 1 ? fmt::format(", the largest of {}", jumps.count) : std::string(),
+               jumps.pixels, per_unit * jumps.largest.deviation, unit, per_unit * jumps.usual);
   }
 
   const RecordingStatistics& recording_;
-  double depth_m_;
+  double depth_m_;  // at which motion is seen: a middle one of the scene
   double max_gap_s_;
   double focal_px_ = 0;
   PoseSpan events_;  // their time
   PoseMotion motion_;
-  std::vector<Warning> warnings_;
+  std::vector<Warning>& warnings_;
 };
 
 }  // namespace
 
-std::vector<Warning> motionWarnings(const RecordingStatistics& recording, double depth_m,
-                                    double max_pose_gap_s) {
-  return MotionChecks(recording, depth_m, max_pose_gap_s).run();
+void checkMotion(const Findings& findings, std::vector<Warning>& warnings) {
+  MotionChecks(findings, warnings).run();
 }
 
 }  // namespace efm

@@ -92,7 +92,6 @@ double angleOf(const Rigid3& T_world_a, const Rigid3& T_world_b) {
 StatisticsOptions statisticsOptions(const EventFusionOptions& options) {
   StatisticsOptions statistics;
   const FusionMapperOptions& mapper = options.mapper;
-  statistics.limits = mapper.interval();
   statistics.cameras = mapper.cameras;
   statistics.time_offsets_ns = options.rig.time_offsets_ns;
   statistics.T_body_rig = readRigSetup(options.rig).T_body_rig;
@@ -148,7 +147,7 @@ void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
 
 bool RecordingStatistics::add(const Sample& sample) {
   if (const auto* packet = std::get_if<EventPacket>(&sample)) {
-    addEvents(packet->camera, packet->label, packet->calibration, packet->events);
+    addEvents(*packet);
     return true;
   }
   const auto* pose = std::get_if<PoseSample>(&sample);
@@ -157,15 +156,16 @@ bool RecordingStatistics::add(const Sample& sample) {
   return true;
 }
 
-void RecordingStatistics::addEvents(int index, const std::string& label, const RigCamera& camera,
-                                    const std::vector<Event>& events) {
+void RecordingStatistics::addEvents(const EventPacket& packet) {
+  const int index = packet.camera;
+  const RigCamera& camera = packet.calibration;
   const auto& selected = options_.cameras;
   if (!selected.empty() && std::count(selected.begin(), selected.end(), index) == 0) return;
-  const auto [entry, is_new] = cameras_.try_emplace({index, label});
+  const auto [entry, is_new] = cameras_.try_emplace({index, packet.label});
   CameraStatistics& statistics = entry->second;
   const auto width = static_cast<std::size_t>(camera.model.width);
   if (is_new) {
-    statistics.label = label;
+    statistics.label = packet.label;
     statistics.camera = camera;
     const auto offset = static_cast<std::size_t>(index);
     if (offset < options_.time_offsets_ns.size()) {
@@ -176,16 +176,13 @@ void RecordingStatistics::addEvents(int index, const std::string& label, const R
     const std::size_t pixels = width * static_cast<std::size_t>(camera.model.height);
     if (pixels <= kMaxPixels) statistics.pixels.assign(pixels, 0);
   }
-  const std::int64_t from_ns = options_.limits.t0_ns.value_or(kMinTimeNs);
-  const std::int64_t until_ns = options_.limits.t1_ns.value_or(kMaxTimeNs);
   const std::int64_t offset_ns = statistics.camera.time_offset_ns;
   std::vector<std::int64_t>& times_ns = statistics.newest_ns;
   times_ns.clear();
-  times_ns.reserve(events.size());
+  times_ns.reserve(packet.events.size());
   std::uint64_t positive = 0;
-  for (const Event& event : events) {
+  for (const Event& event : packet.events) {
     const std::int64_t t_ns = onTrajectoryClock(event.t_ns, offset_ns);
-    if (t_ns < from_ns || t_ns >= until_ns) continue;
     statistics.rate.add(t_ns);
     positive += event.polarity ? 1 : 0;
     const std::size_t pixel = event.y * width + event.x;
@@ -246,25 +243,21 @@ const PoseStatistics* RecordingStatistics::usedPoses() const {
   return used;
 }
 
-std::optional<std::pair<std::int64_t, std::int64_t>> RecordingStatistics::eventSpan() const {
-  std::optional<std::pair<std::int64_t, std::int64_t>> span;
+std::optional<TimeSpan> RecordingStatistics::eventSpan() const {
+  std::optional<TimeSpan> span;
   for (const auto& [key, camera] : cameras_) {
     if (!camera.events.first_ns) continue;
-    if (!span) span = {*camera.events.first_ns, *camera.events.last_ns};
-    span->first = std::min(span->first, *camera.events.first_ns);
-    span->second = std::max(span->second, *camera.events.last_ns);
+    extend(span, *camera.events.first_ns);
+    extend(span, *camera.events.last_ns);
   }
   return span;
 }
 
-double RecordingStatistics::overlap() const {
-  const auto span = eventSpan();
-  const PoseStatistics* const used = usedPoses();
-  if (!span || !used) return 1;
-  const std::int64_t from_ns = std::max(span->first, *used->poses.first_ns);
-  const std::int64_t until_ns = std::min(span->second, *used->poses.last_ns);
+double overlapOf(const TimeSpan& events, const TimeSpan& poses) {
+  const std::int64_t from_ns = std::max(events.first_ns, poses.first_ns);
+  const std::int64_t until_ns = std::min(events.last_ns, poses.last_ns);
   if (from_ns > until_ns) return 0;
-  const double events_s = secondsBetween(span->first, span->second);
+  const double events_s = secondsBetween(events.first_ns, events.last_ns);
   return events_s > 0 ? secondsBetween(from_ns, until_ns) / events_s : 1;
 }
 

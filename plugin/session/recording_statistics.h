@@ -19,6 +19,7 @@
 #include "plugin/session/pose_motion.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/sample.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 
@@ -50,13 +51,15 @@ class EventRate {
   std::array<std::uint64_t, kBins> counts_{};
 };
 
+/// The fraction of the events' time that poses cover, 0 to 1.
+double overlapOf(const TimeSpan& events, const TimeSpan& poses);
+
 /// A line of block characters (UTF-8), one per value: of eight heights up to the largest value; a
 /// blank for 0.
 std::string sparkline(const std::vector<double>& values);
 
-/// Which part of a recording counts, and how it is understood. The default: all, as recorded.
+/// How a recording is understood. The default: as recorded.
 struct StatisticsOptions {
-  TimeLimits limits;                          ///< Events outside do not count.
   std::vector<int> cameras;                   ///< Those that take part; empty: all.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera, instead of the recording's.
   std::optional<Rigid3> T_body_rig;           ///< Instead of the recording's.
@@ -122,11 +125,12 @@ class RecordingStatistics {
 
   explicit RecordingStatistics(StatisticsOptions options = {}) : options_(std::move(options)) {}
 
+  /// The motion that counts is that within this time. To be called before the first pose.
+  void setWindow(double window_s) { options_.window_s = window_s; }
   /// @return false for a sample that is neither events nor a pose.
   bool add(const Sample& sample);
-  /// @param events in time order.
-  void addEvents(int index, const std::string& label, const RigCamera& camera,
-                 const std::vector<Event>& events);
+  /// @param packet with its events in time order.
+  void addEvents(const EventPacket& packet);
   /// @param T_body_rig of the recording.
   void addPose(const PoseSourceId& source, std::int64_t t_ns, const Rigid3& T_world_body,
                const Rigid3& T_body_rig);
@@ -138,9 +142,7 @@ class RecordingStatistics {
   /// The source whose poses are used: see PoseSourceSelector. Null where there is none.
   const PoseStatistics* usedPoses() const;
   /// First and last event of all cameras.
-  std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan() const;
-  /// The fraction of the events' time that the used poses cover, 0 to 1; 1 without events or poses.
-  double overlap() const;
+  std::optional<TimeSpan> eventSpan() const;
   /// Events earlier than the first pose, and later than the last, of all sources.
   std::uint64_t eventsBeforePoses() const { return events_before_poses_; }
   std::uint64_t eventsAfterPoses() const { return events_after_poses_; }

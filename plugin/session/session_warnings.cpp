@@ -48,11 +48,6 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
   const auto text = [&](const TimeSpan& span) {
     return timeText(span.first_ns, span.last_ns, start_ns);
   };
-  const auto& [t0_ns, t1_ns] = options.limits;
-  if ((t0_ns && *t0_ns > status.events->last_ns) || (t1_ns && *t1_ns <= status.events->first_ns)) {
-    return fmt::format("no event lies {}: the events span {}", limitsText(options.limits),
-                       text(*status.events));
-  }
   const std::string spans =
       fmt::format("the events span {}, the poses {}", text(*status.events), text(*status.poses));
   const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
@@ -105,86 +100,77 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
 
 namespace {
 
-/// Collects warnings: a name, and a sentence in fmt's format.
-class WarningList {
- public:
-  template <typename... Values>
-  void add(const char* name, fmt::format_string<Values...> text, Values&&... values) {
-    warnings_.push_back({name, fmt::format(text, std::forward<Values>(values)...)});
-  }
-  std::vector<Warning> take() { return std::move(warnings_); }
-
- private:
-  std::vector<Warning> warnings_;
-};
+using Warnings = std::vector<Warning>;
 
 void addUnusedEvents(const SessionStatus& status, const FusionMapperOptions& options,
-                     WarningList& warnings) {
+                     Warnings& warnings) {
   if (status.counts.sorted_events > 0) {
-    warnings.add("sorted-events", "{} events came later than newer ones and were sorted",
-                 status.counts.sorted_events);
+    addWarning(warnings, "sorted-events", "{} events came later than newer ones and were sorted",
+               status.counts.sorted_events);
   }
   for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
     const EventCounts& events = status.counts.cameras[c];
     if (events[EventFate::kOutsideLens] == 0) continue;
-    warnings.add("outside-lens",
-                 "{} of {} events of camera {} were not used: its lens model has no viewing ray "
-                 "for their pixels (outside_lens)",
-                 events[EventFate::kOutsideLens], events.read, c);
+    addWarning(warnings, "outside-lens",
+               "{} of {} events of camera {} were not used: its lens model has no viewing ray "
+               "for their pixels (outside_lens)",
+               events[EventFate::kOutsideLens], events.read, c);
   }
   if (status.counts.keyframes == 0) return;  // the error says why
   const EventCounts counts = status.counts.total();
   const std::uint64_t wanted =
       counts.read - counts[EventFate::kDropped];  // events of unselected cameras
   if (counts[EventFate::kWithoutPose] > wanted / 2) {
-    warnings.add("events-without-pose",
-                 "{} of {} events have no pose: poses begin late, end early or have gaps "
-                 "(--poses, [rig] max_pose_gap_s)",
-                 counts[EventFate::kWithoutPose], wanted);
+    addWarning(warnings, "events-without-pose",
+               "{} of {} events have no pose: poses begin late, end early or have gaps "
+               "(--poses, [rig] max_pose_gap_s)",
+               counts[EventFate::kWithoutPose], wanted);
   }
   // With limits on time, or windows apart from each other, it is what was asked for.
   const bool gapless = options.policy.policy != KeyframePolicyKind::kPeriod ||
                        options.policy.stride_s <= options.policy.window_s;
   const bool whole = !options.only_window && !options.limits.t0_ns && !options.limits.t1_ns;
   if (whole && gapless && counts[EventFate::kOutsideWindow] > wanted / 2) {
-    warnings.add("events-outside-windows",
-                 "{} of {} events lie in no window that was mapped: windows are too long for the "
-                 "recording, or saw too little motion ([keyframes] window_s, min_baseline_ratio)",
-                 counts[EventFate::kOutsideWindow], wanted);
+    addWarning(warnings, "events-outside-windows",
+               "{} of {} events lie in no window that was mapped: windows are too long for the "
+               "recording, or saw too little motion ([keyframes] window_s, min_baseline_ratio)",
+               counts[EventFate::kOutsideWindow], wanted);
   }
 }
 
-void addSilence(const SessionStatus& status, bool exclude_silent, WarningList& warnings) {
+void addSilence(const SessionStatus& status, bool exclude_silent, Warnings& warnings) {
   for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
     if (status.silent_keyframes[c] == 0) continue;
-    warnings.add("silent-keyframes", "camera {} had no event in {} of {} keyframes: {}", c,
-                 status.silent_keyframes[c], status.counts.keyframes,
-                 exclude_silent
-                     ? "the others were fused without it"
-                     : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
-                       "([rig] exclude_silent leaves silent cameras out)");
+    addWarning(warnings, "silent-keyframes", "camera {} had no event in {} of {} keyframes: {}", c,
+               status.silent_keyframes[c], status.counts.keyframes,
+               exclude_silent
+                   ? "the others were fused without it"
+                   : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
+                     "([rig] exclude_silent leaves silent cameras out)");
   }
   if (status.counts.silent_subintervals > 0) {
-    warnings.add("silent-subintervals",
-                 "{} sub-intervals of a camera had no event: rules that ask all of them (min, "
-                 "harmonic, geometric) find nothing where one is empty ([fusion] subintervals)",
-                 status.counts.silent_subintervals);
+    addWarning(warnings, "silent-subintervals",
+               "{} sub-intervals of a camera had no event: rules that ask all of them (min, "
+               "harmonic, geometric) find nothing where one is empty ([fusion] subintervals)",
+               status.counts.silent_subintervals);
   }
 }
 
-void addUnusedPoses(const SessionStatus& status, WarningList& warnings) {
+void addUnusedPoses(const SessionStatus& status, Warnings& warnings) {
   for (const auto& [source, count] : status.other_poses) {
     if (!status.pose_source) break;  // no keyframe: the error says so
-    warnings.add("unused-poses", "{} poses were not used: {}, beside {} ([rig] pose_source)", count,
-                 asText(source), asText(*status.pose_source));
+    addWarning(warnings, "unused-poses",
+               "{} poses were not used: {}, beside {} ([rig] pose_source)", count, asText(source),
+               asText(*status.pose_source));
   }
   if (status.counts.duplicate_poses > 0) {
-    warnings.add("duplicate-poses", "{} poses had the time of an earlier one and were left out",
-                 status.counts.duplicate_poses);
+    addWarning(warnings, "duplicate-poses",
+               "{} poses had the time of an earlier one and were left out",
+               status.counts.duplicate_poses);
   }
 }
 
-void addLosses(const SessionStatus& status, WarningList& warnings) {
+void addLosses(const SessionStatus& status, Warnings& warnings) {
   if (!status.live) return;
   const DroppedWindows& dropped = status.counts.dropped_windows;
   if (status.live->dropRatio() > 0 || dropped.total() > 0) {
@@ -200,60 +186,58 @@ void addLosses(const SessionStatus& status, WarningList& warnings) {
     }
     if (overload) why += "; the machine is too slow for more ([live] max_queue_events)";
     if (!status.live->too_large.empty()) why += "; " + status.live->too_large;
-    warnings.add("events-lost", "{:.1f} % of the events were lost; {}{}",
-                 100 * status.live->dropRatio(), asText(dropped), why);
+    addWarning(warnings, "events-lost", "{:.1f} % of the events were lost; {}{}",
+               100 * status.live->dropRatio(), asText(dropped), why);
   }
   if (status.live->errors > 0) {
-    warnings.add("mapping-errors", "{} errors while mapping, the last one: {}", status.live->errors,
-                 status.live->last_error);
+    addWarning(warnings, "mapping-errors", "{} errors while mapping, the last one: {}",
+               status.live->errors, status.live->last_error);
   }
 }
 
-void addKeyframes(const SessionStatus& status, WarningList& warnings) {
+void addKeyframes(const SessionStatus& status, Warnings& warnings) {
   const MapperCounts& counts = status.counts;
   if (status.refinement && status.refinement->counts.registered + 1 < counts.keyframes) {
-    warnings.add("unregistered-keyframes",
-                 "{} of {} keyframes found no place by their points: the tracker's motion stands "
-                 "there",
-                 counts.keyframes - 1 - status.refinement->counts.registered, counts.keyframes);
+    addWarning(warnings, "unregistered-keyframes",
+               "{} of {} keyframes found no place by their points: the tracker's motion stands "
+               "there",
+               counts.keyframes - 1 - status.refinement->counts.registered, counts.keyframes);
   }
   if (status.refinement && status.refinement->failures > 0) {
-    warnings.add("refinement-failures",
-                 "the refinement failed {} times, the last time with: {}; these keyframes keep the "
-                 "tracker's motion",
-                 status.refinement->failures, status.refinement->last_error);
+    addWarning(warnings, "refinement-failures",
+               "the refinement failed {} times, the last time with: {}; these keyframes keep the "
+               "tracker's motion",
+               status.refinement->failures, status.refinement->last_error);
   }
   if (status.refinement && status.refinement->counts.failed_solves > 0) {
-    warnings.add("failed-solves",
-                 "{} minima of the refinement could not be computed: poses stayed as they were",
-                 status.refinement->counts.failed_solves);
+    addWarning(warnings, "failed-solves",
+               "{} minima of the refinement could not be computed: poses stayed as they were",
+               status.refinement->counts.failed_solves);
   }
   if (counts.keyframes == 0) return;
   if (counts.keyframes_without_pose > 0) {
-    warnings.add("windows-without-pose",
-                 "{} windows were left out: no pose at their reference time ([rig] max_pose_gap_s)",
-                 counts.keyframes_without_pose);
+    addWarning(warnings, "windows-without-pose",
+               "{} windows were left out: no pose at their reference time ([rig] max_pose_gap_s)",
+               counts.keyframes_without_pose);
   }
   if (counts.windows_without_events > 0) {
-    warnings.add("windows-without-events",
-                 "{} windows were left out: the selected cameras saw nothing",
-                 counts.windows_without_events);
+    addWarning(warnings, "windows-without-events",
+               "{} windows were left out: the selected cameras saw nothing",
+               counts.windows_without_events);
   }
 }
 
 }  // namespace
 
-std::vector<Warning> sessionWarnings(const SessionStatus& status,
-                                     const FusionMapperOptions& options) {
-  WarningList warnings;
-  addUnusedEvents(status, options, warnings);
-  addSilence(status, options.keyframe.exclude_silent, warnings);
+void checkSession(const Findings& findings, Warnings& warnings) {
+  if (!findings.session) return;
+  const SessionStatus& status = *findings.session;
+  addUnusedEvents(status, *findings.options, warnings);
+  addSilence(status, findings.options->keyframe.exclude_silent, warnings);
   addUnusedPoses(status, warnings);
   addKeyframes(status, warnings);
   addLosses(status, warnings);
-  std::vector<Warning> all = warnings.take();
-  if (status.scene_unknown) all.push_back(noSceneWarning());
-  return all;
+  if (status.scene_unknown) warnings.push_back(noSceneWarning());
 }
 
 Warning noSceneWarning() {

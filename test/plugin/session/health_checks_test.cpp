@@ -39,17 +39,14 @@ RecordingStatistics statisticsOf(const SyntheticRecording& recording,
     statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
   }
   for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
-    statistics.addEvents(static_cast<int>(c), "cam", recording.cameras[c], recording.events[c]);
+    statistics.addEvents({static_cast<int>(c), recording.cameras[c], recording.events[c]});
   }
   return statistics;
 }
 
 std::vector<Warning> warningsOf(const SyntheticRecording& recording,
                                 const StatisticsOptions& options = {}) {
-  const RecordingStatistics statistics = statisticsOf(recording, options);
-  std::vector<Warning> warnings = missingParts(statistics);
-  for (const Warning& warning : healthWarnings(statistics, {})) warnings.push_back(warning);
-  return warnings;
+  return warningsOf(Findings{statisticsOf(recording, options), {}});
 }
 
 /// Turns pose i by `rate` radians per second.
@@ -168,11 +165,17 @@ TEST(HealthChecks, OtherUnitsOfTimeAreGuessed) {
   }
 }
 
+std::vector<Warning> cameraWarnings(const RecordingStatistics& statistics) {
+  std::vector<Warning> warnings;
+  checkCameras({statistics, {}}, warnings);
+  return warnings;
+}
+
 /// The warnings of cameras that have no events.
 std::vector<Warning> warningsOf(const std::vector<RigCamera>& cameras) {
   RecordingStatistics statistics;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    statistics.addEvents(static_cast<int>(c), "cam", cameras[c], {});
+    statistics.addEvents({static_cast<int>(c), cameras[c], {}});
   }
   return cameraWarnings(statistics);
 }
@@ -271,7 +274,7 @@ TEST(HealthChecks, ActivityOfCamerasIsCompared) {
         events.push_back({static_cast<std::int64_t>(i), static_cast<std::uint16_t>(pixel % 120),
                           static_cast<std::uint16_t>(pixel / 120 % 90), positive});
       }
-      statistics.addEvents(static_cast<int>(c), "cam", cameras[c], events);
+      statistics.addEvents({static_cast<int>(c), cameras[c], events});
     }
     expectWarning(cameraWarnings(statistics), row.expected, row.expected);
   }
@@ -280,22 +283,21 @@ TEST(HealthChecks, ActivityOfCamerasIsCompared) {
 TEST(RecordingStatistics, CountsByTheTimesOfEventsAndPoses) {
   StatisticsOptions options;
   options.time_offsets_ns = {0, 5};
-  options.limits = {10, 106};
   RecordingStatistics statistics(options);
   const std::vector<RigCamera> cameras = SyntheticRecording(0.01).cameras;
   const auto add_events = [&](int c, const std::vector<std::int64_t>& times_ns) {
     std::vector<Event> events;
     for (const std::int64_t t_ns : times_ns) events.push_back({t_ns, 3, 2, t_ns % 20 == 0});
-    statistics.addEvents(c, "cam", cameras[static_cast<std::size_t>(c)], events);
+    statistics.addEvents({c, cameras[static_cast<std::size_t>(c)], events});
   };
   const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
   const PoseSourceId tracker{PoseKind::kPose, "tracker"};
   const auto add_pose = [&](const PoseSourceId& source, std::int64_t t_ns) {
     statistics.addPose(source, t_ns, {}, {});
   };
-  add_events(0, {9, 10, 20, 30});
+  add_events(0, {10, 20, 30});
   add_pose(wheels, 20);
-  add_events(1, {12, 100, 101});  // 5 later by their offset
+  add_events(1, {12, 100});  // 5 later by their offset
   EXPECT_EQ(statistics.eventsBeforePoses(), 2U);
   EXPECT_EQ(statistics.eventsAfterPoses(), 2U);
   add_pose(tracker, 60);
@@ -304,16 +306,17 @@ TEST(RecordingStatistics, CountsByTheTimesOfEventsAndPoses) {
   add_events(0, {55, 60, 61});
   EXPECT_EQ(statistics.eventsBeforePoses(), 2U);
   EXPECT_EQ(statistics.eventsAfterPoses(), 2U);
-  const StreamStatistics& stream = statistics.cameras().at({0, "cam"}).events;
+  const StreamStatistics& stream = statistics.cameras().at({0, ""}).events;
   EXPECT_EQ(stream.count, 6U);
   EXPECT_EQ(stream.max_gap_ns, 25);
   EXPECT_EQ(stream.max_gap_start_ns, 30);
   EXPECT_NEAR(stream.rate(), 6 / 51e-9, 1);
-  EXPECT_EQ(statistics.cameras().at({0, "cam"}).positive, 2U);
-  EXPECT_EQ(statistics.cameras().at({0, "cam"}).pixels.at(2 * 120 + 3), 6U);
-  EXPECT_EQ(*statistics.eventSpan(), (std::pair<std::int64_t, std::int64_t>{10, 105}));
+  EXPECT_EQ(statistics.cameras().at({0, ""}).positive, 2U);
+  EXPECT_EQ(statistics.cameras().at({0, ""}).pixels.at(2 * 120 + 3), 6U);
+  EXPECT_EQ(statistics.eventSpan()->first_ns, 10);
+  EXPECT_EQ(statistics.eventSpan()->last_ns, 105);
   EXPECT_EQ(statistics.usedPoses()->poses.count, 2U) << "the better kind";
-  EXPECT_NEAR(statistics.overlap(), 20.0 / 95, 1e-9);
+  EXPECT_NEAR(overlapOf(*statistics.eventSpan(), {40, 60}), 20.0 / 95, 1e-9);
 }
 
 TEST(RecordingStatistics, SpeedsAreThoseOverTenMilliseconds) {
@@ -342,9 +345,6 @@ TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
   recording = soundRecording();
   for (StampedPose& pose : recording.poses) pose.t_ns += 1'000'000'000;
   options = {};
-  options.limits.t0_ns = SyntheticRecording::kStartNs + 1'000'000'000;
-  EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "earlier events do not count";
-  options = {};
   options.time_offsets_ns = {1'000'000'000, 1'000'000'000};
   EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "the clocks differ by this";
 
@@ -355,8 +355,18 @@ TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
   EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "an arm of a metre turns";
 
   const RecordingStatistics statistics = statisticsOf(soundRecording());
-  EXPECT_EQ(namesOf(healthWarnings(statistics, {100, 200, 0.25})), Names{"no-motion"});
-  EXPECT_EQ(namesOf(healthWarnings(statistics, {0.5, 5, 0.005})), Names{"pose-gap"});
+  Findings findings{statistics, {}};
+  findings.max_pose_gap_s = 0.005;
+  EXPECT_EQ(namesOf(warningsOf(findings)), Names{"pose-gap"});
+  EXPECT_EQ(namesOf(warningsOf(Findings{statistics, {}, kMaxTimeNs, 100, 200})),
+            Names{"no-motion"});
+
+  recording = soundRecording();  // the poses of a run that was stopped after a second
+  recording.poses.resize(recording.poses.size() / 2);
+  EXPECT_EQ(namesOf(warningsOf(recording)), Names{"clock-overlap"});
+  const RecordingStatistics half = statisticsOf(recording);
+  EXPECT_THAT(warningsOf(Findings{half, {}, SyntheticRecording::kStartNs + 1'000'000'000}),
+              IsEmpty());
 }
 
 TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
@@ -398,8 +408,8 @@ struct Sensor {
       events.insert(events.end(), counts[i], event);
     }
     RecordingStatistics statistics;
-    statistics.addEvents(0, "cam", SyntheticRecording(0.01).cameras[0], events);
-    return healthWarnings(statistics, {});
+    statistics.addEvents({0, SyntheticRecording(0.01).cameras[0], events});
+    return cameraWarnings(statistics);
   }
 };
 
@@ -507,6 +517,12 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     status.pose_source = PoseSourceId{PoseKind::kPose, "pose"};
     return status;
   }();
+  const auto warnings_of = [](const SessionStatus& status, const FusionMapperOptions& options) {
+    std::vector<Warning> warnings;
+    checkSession({RecordingStatistics(), {}, kMaxTimeNs, 0.5, 5, 0.25, &status, &options},
+                 warnings);
+    return warnings;
+  };
   struct Row {
     std::function<void(SessionStatus&, FusionMapperOptions&)> make;
     const char* expected;
@@ -609,13 +625,13 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     SessionStatus status = sound;
     FusionMapperOptions options;
     row.make(status, options);
-    expectWarning(sessionWarnings(status, options), row.expected, row.expected);
+    expectWarning(warnings_of(status, options), row.expected, row.expected);
   }
   SessionStatus none = sound;  // without a keyframe its error says why
   none.counts.keyframes = 0;
   none.counts.cameras[0][EventFate::kWithoutPose] = none.counts.windows_without_events = 60;
   none.counts.keyframes_without_pose = 1;
-  EXPECT_THAT(linesOf(sessionWarnings(none, {})), IsEmpty());
+  EXPECT_THAT(linesOf(warnings_of(none, {})), IsEmpty());
 }
 
 TEST(SessionStatus, IsSaidInWords) {

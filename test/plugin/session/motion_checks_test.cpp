@@ -41,8 +41,10 @@ std::vector<Warning> warningsOf(const std::vector<StampedPose>& poses,
   for (const StampedPose& pose : poses) {
     statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
   }
-  statistics.addEvents(0, "cam", camera, events);
-  return motionWarnings(statistics, depth_m, 0.25);
+  statistics.addEvents({0, camera, events});
+  std::vector<Warning> warnings;
+  checkMotion({statistics, {}, kMaxTimeNs, depth_m, depth_m}, warnings);
+  return warnings;
 }
 
 /// A camera in a hand, its poses and the rate of its events.
