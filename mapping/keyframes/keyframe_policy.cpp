@@ -318,7 +318,8 @@ std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) c
   return next_ns_.value_or(recording.startNs());
 }
 
-std::uint64_t BaselinePolicy::dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) {
+std::uint64_t BaselinePolicy::dropWindowsBefore(const RecordingProgress& recording,
+                                                std::int64_t t_ns) {
   const std::int64_t from_ns = earliestStart(recording);
   if (t_ns <= from_ns) return 0;
   startAt(t_ns);

@@ -113,7 +113,8 @@ class KeyframePolicy {
   /// Gives up the windows that begin before `t_ns`. @return their number. Where the ends of windows
   /// depend on data, which may be missing, it is the number that the events before `t_ns` would
   /// have filled. A window that is given up piece by piece counts once.
-  virtual std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) = 0;
+  virtual std::uint64_t dropWindowsBefore(const RecordingProgress& recording,
+                                          std::int64_t t_ns) = 0;
 };
 
 /// @param depth_guess_m mean depth of the scene before the first keyframe.

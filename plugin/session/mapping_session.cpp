@@ -320,7 +320,7 @@ void MappingSession::dropOlderHalf() {
       static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
   if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
   mapper_.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
-                       too_large ? DropReason::kTooLarge : DropReason::kOverload);
+                            too_large ? DropReason::kTooLarge : DropReason::kOverload);
   constexpr double kNews = 1.2;  // one that is that much larger is reported again
   if (!too_large || needed < kNews * reported_needed_) return;
   reported_needed_ = needed;
