@@ -2,21 +2,16 @@
 #include "plugin/evaluation/cloud_evaluation.h"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include "maps/io/point_cloud_file.h"
-#include "plugin/evaluation/depth_series.h"
-#include "plugin/evaluation/text_table.h"
+#include "plugin/evaluation/depth_file.h"
+#include "plugin/evaluation/evaluation_text.h"
 #include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 PointCloudContent readPoints(const std::filesystem::path& file) {
   PointCloudContent content = readPointCloud(file);
@@ -26,17 +21,7 @@ PointCloudContent readPoints(const std::filesystem::path& file) {
   return content;
 }
 
-std::vector<std::string> distanceRow(const std::string& name, const SampleStatistics& statistics,
-                                     double p90_m) {
-  std::vector<std::string> row = {name, std::to_string(statistics.count)};
-  for (const double value :
-       {statistics.mean, statistics.median, p90_m, statistics.rms, statistics.max}) {
-    row.push_back(fixedText(value, 4));
-  }
-  return row;
-}
-
-Json distanceJson(const SampleStatistics& statistics, double p90_m) {
+EvaluationJson distanceJson(const SampleStatistics& statistics, double p90_m) {
   return {{"points", statistics.count},    {"mean_m", statistics.mean},
           {"median_m", statistics.median}, {"rms_m", statistics.rms},
           {"max_m", statistics.max},       {"p90_m", p90_m}};
@@ -58,10 +43,10 @@ double degreesOf(const Rigid3& transform) {
   return 180 / kPi * Eigen::AngleAxisd(transform.rotation).angle();
 }
 
-Json alignmentJson(const CloudAlignment& alignment) {
+EvaluationJson alignmentJson(const CloudAlignment& alignment) {
   const Eigen::Vector3d& p = alignment.T_truth_map.translation;
   const Eigen::Matrix3d rotation = alignment.T_truth_map.rotation.toRotationMatrix();
-  Json matrix = Json::array();
+  EvaluationJson matrix = EvaluationJson::array();
   for (int row = 0; row < 3; ++row) {
     matrix.push_back({rotation(row, 0), rotation(row, 1), rotation(row, 2), p[row]});
   }
@@ -80,6 +65,25 @@ std::string alignmentText(const CloudAlignment& alignment) {
       "  and turned by {:.4f} deg about the origin, from {} of {} points compared\n\n",
       p.x(), p.y(), p.z(), degreesOf(alignment.T_truth_map), alignment.points_used,
       alignment.points);
+}
+
+EvaluationJson asJson(const CloudEvaluation& evaluation) {
+  const CloudErrors& errors = evaluation.errors;
+  EvaluationJson json;
+  json["accuracy"] = distanceJson(errors.accuracy, errors.accuracy_p90_m);
+  json["completeness_distance"] =
+      distanceJson(errors.completeness_distance, errors.completeness_distance_p90_m);
+  json["curve"] = EvaluationJson::array();
+  for (const CloudErrors::Step& step : errors.steps) {
+    json["curve"].push_back({{"distance_m", step.distance_m},
+                             {"within", step.within},
+                             {"outliers", step.outliers},
+                             {"completeness", step.completeness},
+                             {"f1", step.f1}});
+  }
+  json["non_finite"] = evaluation.non_finite;
+  if (evaluation.alignment) json["alignment"] = alignmentJson(*evaluation.alignment);
+  return json;
 }
 
 }  // namespace
@@ -105,21 +109,22 @@ CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
 }
 
 std::string evaluationTable(const CloudEvaluation& evaluation) {
-  const CloudErrors& errors = evaluation.errors;
-  TextTable distances;
-  distances.add({"distances in m", "points", "mean", "median", "90 %", "rms", "max"});
-  distances.add(distanceRow("map to truth (accuracy)", errors.accuracy, errors.accuracy_p90_m));
-  distances.add(distanceRow("truth to map (completeness)", errors.completeness_distance,
-                            errors.completeness_distance_p90_m));
-  TextTable steps;
-  steps.add({"distance m", "map within %", "outliers %", "completeness %", "F1 %"});
-  for (const CloudErrors::Step& step : errors.steps) {
-    steps.add({fixedText(step.distance_m, 3), fixedText(100 * step.within, 2),
-               fixedText(100 * step.outliers, 2), fixedText(100 * step.completeness, 2),
-               fixedText(100 * step.f1, 2)});
-  }
+  const EvaluationJson json = asJson(evaluation);
+  EvaluationJson distances = {json["accuracy"], json["completeness_distance"]};
+  distances[0]["name"] = "map to truth (accuracy)";
+  distances[1]["name"] = "truth to map (completeness)";
+  const std::vector<TableColumn> distance_columns = {
+      {"distances in m", "name"}, {"points", "points"}, {"mean", "mean_m", 4},
+      {"median", "median_m", 4},  {"90 %", "p90_m", 4}, {"rms", "rms_m", 4},
+      {"max", "max_m", 4}};
+  const std::vector<TableColumn> step_columns = {{"distance m", "distance_m", 3},
+                                                 {"map within %", "within", 2, 100},
+                                                 {"outliers %", "outliers", 2, 100},
+                                                 {"completeness %", "completeness", 2, 100},
+                                                 {"F1 %", "f1", 2, 100}};
   std::string text = evaluation.alignment ? alignmentText(*evaluation.alignment) : "";
-  text += distances.text() + "\n" + steps.text();
+  text += tableText(tableRows(distance_columns, distances)) + "\n" +
+          tableText(tableRows(step_columns, json["curve"]));
   if (evaluation.non_finite > 0) {
     text += fmt::format("{} points are not finite and were left out\n", evaluation.non_finite);
   }
@@ -127,22 +132,7 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
 }
 
 std::string evaluationJson(const CloudEvaluation& evaluation) {
-  const CloudErrors& errors = evaluation.errors;
-  Json json;
-  json["accuracy"] = distanceJson(errors.accuracy, errors.accuracy_p90_m);
-  json["completeness_distance"] =
-      distanceJson(errors.completeness_distance, errors.completeness_distance_p90_m);
-  json["curve"] = Json::array();
-  for (const CloudErrors::Step& step : errors.steps) {
-    json["curve"].push_back({{"distance_m", step.distance_m},
-                             {"within", step.within},
-                             {"outliers", step.outliers},
-                             {"completeness", step.completeness},
-                             {"f1", step.f1}});
-  }
-  json["non_finite"] = evaluation.non_finite;
-  if (evaluation.alignment) json["alignment"] = alignmentJson(*evaluation.alignment);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return jsonText(asJson(evaluation));
 }
 
 std::string cloudEvaluationKeys() {
@@ -162,22 +152,13 @@ std::string cloudEvaluationKeys() {
 }
 
 cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
-  std::vector<CloudErrors::Step> steps = evaluation.errors.steps;
-  std::sort(steps.begin(), steps.end(),
-            [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; });
-  std::array<std::vector<cv::Point2d>, 3> points;
-  for (const CloudErrors::Step& step : steps) {
-    points[0].emplace_back(step.distance_m, 100 * step.within);
-    points[1].emplace_back(step.distance_m, 100 * step.completeness);
-    points[2].emplace_back(step.distance_m, 100 * step.f1);
-  }
-  CurvePlot plot;
+  CurvePlot plot = fractionPlot(asJson(evaluation)["curve"], "distance_m",
+                                {{"within", "accuracy: map to truth"},
+                                 {"completeness", "completeness: truth to map"},
+                                 {"f1", "F1"}});
   plot.title = "map and truth";
-  plot.x = {"distance [m]", AxisScale::kLogarithmic};
-  plot.y = {"within [%]", AxisScale::kLinear, 0, 102};
-  plot.curves = {{"accuracy: map to truth", points[0], CurveStyle::kMarkedLine},
-                 {"completeness: truth to map", points[1], CurveStyle::kMarkedLine},
-                 {"F1", points[2], CurveStyle::kMarkedLine}};
+  plot.x.label = "distance [m]";
+  plot.y.label = "within [%]";
   return drawCurves(plot);
 }
 

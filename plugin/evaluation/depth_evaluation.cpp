@@ -2,17 +2,24 @@
 #include "plugin/evaluation/depth_evaluation.h"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
+#include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
+#include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
-#include "plugin/evaluation/depth_series.h"
+#include "plugin/evaluation/evaluation_text.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
+#include "plugin/results/pictures/depth_picture.h"
 
 namespace efm {
 namespace {
@@ -21,67 +28,62 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kSameTimeNs = 1'000'000;
 
-/// Compares one map after the other and collects the errors.
-class Comparison {
- public:
-  explicit Comparison(const DepthEvaluationOptions& options) : options_(options) {
-    if (!options.mask.empty()) mask_ = readMaskFile(options.mask);
-  }
+ComparedDepths readDepths(const EvaluatedMap& map, const cv::Mat1b& mask,
+                          const DepthEvaluationOptions& options) {
+  return {readDepthFile(map.estimate, options.png_scale),
+          readDepthFile(map.truth, options.png_scale), mask};
+}
 
-  void add(const std::string& name, const fs::path& estimate, const fs::path& truth) {
-    const ComparedDepths depths{readDepthFile(estimate, options_.png_scale),
-                                readDepthFile(truth, options_.png_scale), mask_};
+cv::Mat1b maskOf(const DepthEvaluationOptions& options) {
+  return options.mask.empty() ? cv::Mat1b() : readMaskFile(options.mask);
+}
+
+/// Pairs each map with the truth nearest in time.
+void pairSeries(const std::vector<TimedFile>& estimates, const std::vector<TimedFile>& truths,
+                DepthEvaluation& evaluation) {
+  std::set<const TimedFile*> used;
+  for (const TimedFile& map : estimates) {
+    const TimedFile* match = nearestFile(truths, map.t_ns, kSameTimeNs);
+    if (match == nullptr) {
+      ++evaluation.without_truth;
+      continue;
+    }
+    evaluation.maps.push_back({formatSeconds(map.t_ns), {}, map.file, match->file});
+    used.insert(match);
+  }
+  evaluation.without_estimate = truths.size() - used.size();
+}
+
+/// Compares one map after the other.
+/// @return whether there is a pixel with both depths.
+bool compare(DepthEvaluation& evaluation, const cv::Mat1b& mask,
+             const DepthEvaluationOptions& options) {
+  std::vector<DepthPair> all;
+  std::vector<DepthErrors> errors;
+  for (EvaluatedMap& map : evaluation.maps) {
+    const ComparedDepths depths = readDepths(map, mask, options);
     try {
       depths.validate();
     } catch (const std::invalid_argument& error) {
-      throw std::runtime_error(estimate.string() + " and " + truth.string() + ": " + error.what());
+      throw std::runtime_error(map.estimate.string() + " and " + map.truth.string() + ": " +
+                               error.what());
     }
-    const std::vector<DepthPair> pairs = pairDepths(depths, options_.pairing);
+    const std::vector<DepthPair> pairs = pairDepths(depths, options.pairing);
     const PrecisionRecall detection =
-        precisionRecall(depths, options_.thresholds_m, options_.pairing);
-    if (evaluation_.maps.empty()) {
-      evaluation_.detection = detection;
+        precisionRecall(depths, options.thresholds_m, options.pairing);
+    if (errors.empty()) {
+      evaluation.detection = detection;
     } else {
-      evaluation_.detection.add(detection);
+      evaluation.detection.add(detection);
     }
-    evaluation_.maps.push_back(
-        {name, depthErrors(pairs, options_.focal_baseline), estimate, truth});
-    all_.insert(all_.end(), pairs.begin(), pairs.end());
+    map.errors = depthErrors(pairs, options.focal_baseline);
+    errors.push_back(map.errors);
+    all.insert(all.end(), pairs.begin(), pairs.end());
   }
-
-  /// Compares each map with the truth nearest in time.
-  void addSeries(const std::vector<TimedFile>& estimates, const std::vector<TimedFile>& truths) {
-    std::set<const TimedFile*> used;
-    for (const TimedFile& map : estimates) {
-      const TimedFile* match = nearestFile(truths, map.t_ns, kSameTimeNs);
-      if (match == nullptr) {
-        ++evaluation_.without_truth;
-        continue;
-      }
-      add(formatSeconds(map.t_ns), map.file, match->file);
-      used.insert(match);
-    }
-    evaluation_.without_estimate = truths.size() - used.size();
-  }
-
-  bool hasMaps() const { return !evaluation_.maps.empty(); }
-  bool hasPoints() const { return !all_.empty(); }
-
-  DepthEvaluation result() const {
-    DepthEvaluation evaluation = evaluation_;
-    std::vector<DepthErrors> errors;
-    for (const EvaluatedMap& map : evaluation.maps) errors.push_back(map.errors);
-    evaluation.mean = meanOfErrors(errors);
-    evaluation.all = depthErrors(all_, options_.focal_baseline);
-    return evaluation;
-  }
-
- private:
-  const DepthEvaluationOptions& options_;
-  cv::Mat1b mask_;
-  DepthEvaluation evaluation_;
-  std::vector<DepthPair> all_;
-};
+  evaluation.mean = meanOfErrors(errors);
+  evaluation.all = depthErrors(all, options.focal_baseline);
+  return !all.empty();
+}
 
 }  // namespace
 
@@ -106,23 +108,24 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
                              ": must be two files or two folders");
   }
 
-  Comparison comparison(options);
+  const cv::Mat1b mask = maskOf(options);
+  DepthEvaluation evaluation;
   if (folders) {
-    comparison.addSeries(depthSeries(estimate, DepthSeriesRole::kEstimate),
-                         depthSeries(truth, DepthSeriesRole::kTruth));
-    if (!comparison.hasMaps()) {
+    pairSeries(depthSeries(estimate, DepthSeriesRole::kEstimate),
+               depthSeries(truth, DepthSeriesRole::kTruth), evaluation);
+    if (evaluation.maps.empty()) {
       throw std::runtime_error(fmt::format("no truth in {} lies within 1 ms of a depth map of {}",
                                            truth.string(), estimate.string()));
     }
   } else {
-    comparison.add(estimate.filename().string(), estimate, truth);
+    evaluation.maps = {{estimate.filename().string(), {}, estimate, truth}};
   }
-  if (!comparison.hasPoints()) {
+  if (!compare(evaluation, mask, options)) {
     throw std::runtime_error(fmt::format("no pixel of {} has a depth where the truth has one{}",
                                          estimate.string(),
                                          options.mask.empty() ? "" : " and the mask is not black"));
   }
-  return comparison.result();
+  return evaluation;
 }
 
 namespace {
@@ -139,13 +142,14 @@ std::optional<fs::path> fileAtOrAbove(const fs::path& path, const std::string& n
 
 /// Nothing if the file is not the report of a run.
 std::optional<StereoBaseline> fromReport(const fs::path& file) {
+  using Pointer = nlohmann::json::json_pointer;
   std::ifstream stream(file);
   const auto report = nlohmann::json::parse(stream, nullptr, false);
-  if (!report.is_object() || !report.contains("reference_view")) return std::nullopt;
-  const auto& view = report["reference_view"];
-  if (!view.is_object() || !view.contains("fx") || !view["fx"].is_number()) return std::nullopt;
-  if (!report.contains("baseline_m") || !report["baseline_m"].is_number()) return std::nullopt;
-  return StereoBaseline{view["fx"], report["baseline_m"], file.string()};
+  if (!report.is_object()) return std::nullopt;
+  const auto focal_px = report.value(Pointer("/reference_view/fx"), nlohmann::json());
+  const auto baseline_m = report.value(Pointer("/baseline_m"), nlohmann::json());
+  if (!focal_px.is_number() || !baseline_m.is_number()) return std::nullopt;
+  return StereoBaseline{focal_px, baseline_m, file.string()};
 }
 
 std::optional<StereoBaseline> fromCamchain(const fs::path& file) {
@@ -155,20 +159,308 @@ std::optional<StereoBaseline> fromCamchain(const fs::path& file) {
                         file.string()};
 }
 
-bool isUsable(const StereoBaseline& stereo) { return stereo.focal_px > 0 && stereo.baseline_m > 0; }
-
 }  // namespace
 
 std::optional<StereoBaseline> findStereoBaseline(const fs::path& estimate, const fs::path& truth) {
-  if (const auto report = fileAtOrAbove(estimate, "report.json", 3)) {
-    auto stereo = fromReport(*report);
-    if (stereo && isUsable(*stereo)) return stereo;
+  const auto read = [](const fs::path& path, const char* name, int levels, auto parse) {
+    const auto file = fileAtOrAbove(path, name, levels);
+    auto stereo = file ? parse(*file) : std::nullopt;
+    return stereo && stereo->focal_px > 0 && stereo->baseline_m > 0 ? stereo : std::nullopt;
+  };
+  const auto stereo = read(estimate, "report.json", 3, fromReport);
+  return stereo ? stereo : read(truth, "camchain.yaml", 2, fromCamchain);
+}
+
+namespace {
+
+/// A field of DepthErrors in the tables and in the JSON.
+struct Measure {
+  const char* key;
+  const char* name;  ///< In the tables, as the unit, factor and decimals.
+  const char* unit;
+  std::optional<double> (*value)(const DepthErrors&);
+  double factor;
+  int decimals;
+  bool of_each_map;  ///< Has a column in the table of the maps, which has space for six.
+  const char* help;
+
+  TableColumn column() const { return {name, key, decimals, factor}; }
+};
+
+using E = DepthErrors;
+using V = std::optional<double>;
+
+constexpr std::array<Measure, 13> kMeasures = {{
+    {"mean_abs_m", "mean |dZ|", "m", [](const E& e) { return V(e.mean_abs_m); }, 1, 4, true,
+     "mean |Z - Z_true|, metres"},
+    {"median_abs_m", "median |dZ|", "m", [](const E& e) { return V(e.median_abs_m); }, 1, 4, true,
+     "median |Z - Z_true|, metres"},
+    {"median_inverse", "median |d(1/Z)|", "1/m", [](const E& e) { return V(e.median_inverse); }, 1,
+     5, false, "median |1/Z - 1/Z_true|, 1/m"},
+    {"bad_pix_5px", "bad-pix 5px,5%", "%", [](const E& e) { return e.bad_pix_5px; }, 100, 2, true,
+     "fraction with a disparity error over 5 px and 5 %"},
+    {"bad_pix_3px", "bad-pix 3px,5%", "%", [](const E& e) { return e.bad_pix_3px; }, 100, 2, false,
+     "fraction with a disparity error over 3 px and 5 % (KITTI)"},
+    {"silog", "SILog", "x100", [](const E& e) { return V(e.silog); }, 1, 3, false,
+     "100 (mean d^2 - (mean d)^2), d = ln Z - ln Z_true"},
+    {"aerrr", "AErrR", "%", [](const E& e) { return V(e.aerrr); }, 100, 2, true,
+     "mean |Z - Z_true| / Z_true"},
+    {"aerrr_by_estimate", "AErrR by estimate", "%",
+     [](const E& e) { return V(e.aerrr_by_estimate); }, 100, 2, false, "mean |Z - Z_true| / Z"},
+    {"log_rmse", "log RMSE", "x100", [](const E& e) { return V(e.log_rmse); }, 1, 3, false,
+     "100 sqrt(mean d^2)"},
+    {"delta_1", "delta<1.25", "%", [](const E& e) { return V(e.delta[0]); }, 100, 2, true,
+     "fraction with max(Z/Z_true, Z_true/Z) under 1.25"},
+    {"delta_2", "delta<1.25^2", "%", [](const E& e) { return V(e.delta[1]); }, 100, 2, false,
+     "the same under 1.25^2"},
+    {"delta_3", "delta<1.25^3", "%", [](const E& e) { return V(e.delta[2]); }, 100, 2, false,
+     "the same under 1.25^3"},
+    {"beyond_tenth", "beyond 10%", "%", [](const E& e) { return V(e.beyond_tenth); }, 100, 2, false,
+     "fraction with |Z - Z_true| over a tenth of Z_true"},
+}};
+
+EvaluationJson asJson(const DepthErrors& errors) {
+  EvaluationJson json = {{"points", errors.points}};
+  if (errors.points == 0) return json;
+  for (const Measure& measure : kMeasures) {
+    if (const auto value = measure.value(errors)) json[measure.key] = *value;
   }
-  if (const auto camchain = fileAtOrAbove(truth, "camchain.yaml", 2)) {
-    auto stereo = fromCamchain(*camchain);
-    if (stereo && isUsable(*stereo)) return stereo;
+  return json;
+}
+
+EvaluationJson asJson(const PrecisionRecall& detection) {
+  EvaluationJson steps = EvaluationJson::array();
+  for (std::size_t k = 0; k < detection.steps.size(); ++k) {
+    steps.push_back({{"threshold_m", detection.steps[k].threshold_m},
+                     {"precision", detection.precision(k)},
+                     {"recall", detection.recall(k)},
+                     {"f1", detection.f1(k)}});
   }
-  return std::nullopt;
+  return steps;
+}
+
+EvaluationJson asJson(const DepthEvaluation& evaluation,
+                      const std::optional<StereoBaseline>& stereo) {
+  EvaluationJson json;
+  json["maps"] = EvaluationJson::array();
+  for (const EvaluatedMap& map : evaluation.maps) {
+    json["maps"].push_back(asJson(map.errors));
+    json["maps"].back()["name"] = map.name;
+  }
+  json["mean"] = asJson(evaluation.mean);
+  json["all"] = asJson(evaluation.all);
+  json["curve"] = asJson(evaluation.detection);
+  json["estimates"] = evaluation.detection.estimates;
+  json["estimates_without_truth"] = evaluation.detection.estimates_without_truth;
+  json["truths"] = evaluation.detection.truths;
+  if (stereo) {
+    json["focal_px"] = stereo->focal_px;
+    json["baseline_m"] = stereo->baseline_m;
+  }
+  json["without_truth"] = evaluation.without_truth;
+  json["without_estimate"] = evaluation.without_estimate;
+  return json;
+}
+
+/// A line per map, with the measures `of_each_map`.
+std::string mapsTable(const EvaluationJson& maps) {
+  std::vector<TableColumn> columns = {{"map", "name"}, {"points", "points"}};
+  TableRow names = {"map", "points"};
+  TableRow units = {"", ""};
+  for (const Measure& measure : kMeasures) {
+    if (!measure.of_each_map) continue;
+    columns.push_back(measure.column());
+    // "bad-pix 5px,5%" takes two lines of the heading, and so do all.
+    const std::string name = std::string(measure.name) + " ";
+    const std::size_t blank = name.find(' ');
+    names.push_back(name.substr(0, blank));
+    units.push_back(name.substr(blank + 1) + measure.unit);
+  }
+  std::vector<TableRow> rows = tableRows(columns, maps);
+  rows[0] = units;
+  rows.insert(rows.begin(), names);
+  return tableText(rows);
+}
+
+/// A line per measure.
+std::string measuresTable(const EvaluationJson& json) {
+  std::vector<TableRow> rows = {{"", "mean of maps", "all points"}};
+  rows.push_back({"points", "", json["all"]["points"].dump()});
+  for (const Measure& measure : kMeasures) {
+    const TableColumn column = measure.column();
+    rows.push_back({fmt::format("{}, {}", measure.name, measure.unit), column.textIn(json["mean"]),
+                    column.textIn(json["all"])});
+  }
+  if (json["maps"].size() < 2) {
+    for (TableRow& row : rows) row.erase(row.begin() + 1);
+  }
+  return tableText(rows);
+}
+
+std::string detectionTable(const EvaluationJson& json) {
+  const std::vector<TableColumn> columns = {{"error up to m", "threshold_m", 3},
+                                            {"precision %", "precision", 2, 100},
+                                            {"recall %", "recall", 2, 100},
+                                            {"F1 %", "f1", 2, 100}};
+  return tableText(tableRows(columns, json["curve"])) +
+         fmt::format("{} estimates with a truth, {} without\n{} pixels with a truth\n",
+                     json["estimates"].dump(), json["estimates_without_truth"].dump(),
+                     json["truths"].dump());
+}
+
+}  // namespace
+
+std::string evaluationTable(const DepthEvaluation& evaluation,
+                            const std::optional<StereoBaseline>& stereo) {
+  const EvaluationJson json = asJson(evaluation, stereo);
+  std::string text;
+  if (evaluation.maps.size() > 1) {
+    text = mapsTable(json["maps"]) + "\n";
+  } else if (!evaluation.maps.empty()) {
+    text = "map " + evaluation.maps.front().name + "\n";
+  }
+  text += measuresTable(json) + "\n" + detectionTable(json);
+  if (stereo) {
+    text += fmt::format("bad-pix with focal length {:.2f} px and baseline {:.4f} m\n({})\n",
+                        stereo->focal_px, stereo->baseline_m, stereo->source);
+  } else if (!evaluation.all.bad_pix_5px) {
+    text += "no bad-pix: it needs a focal length and a baseline (--focal, --baseline)\n";
+  }
+  if (evaluation.without_truth > 0) {
+    text += fmt::format("{} depth maps have no truth within 1 ms\n", evaluation.without_truth);
+  }
+  if (evaluation.without_estimate > 0) {
+    text += fmt::format("{} true maps have no estimate\n", evaluation.without_estimate);
+  }
+  return text;
+}
+
+std::string evaluationJson(const DepthEvaluation& evaluation,
+                           const std::optional<StereoBaseline>& stereo) {
+  return jsonText(asJson(evaluation, stereo));
+}
+
+std::string depthEvaluationKeys() {
+  std::string text =
+      "Keys of --json (fractions from 0 to 1):\n"
+      "  maps      a list, one entry per map: name, points and\n";
+  for (const Measure& measure : kMeasures) {
+    text += fmt::format("            {:18}{}\n", measure.key, measure.help);
+  }
+  return text +
+         "            (left out if points is 0; bad_pix_... only with focal length and baseline)\n"
+         "  mean      mean over the maps; points is the sum\n"
+         "  all       over all points of all maps\n"
+         "  curve     a list, one entry per threshold: threshold_m, precision, recall, f1; over\n"
+         "            all maps\n"
+         "  estimates, estimates_without_truth, truths   numbers of pixels: precision is a\n"
+         "            fraction of estimates, recall a fraction of truths\n"
+         "  focal_px, baseline_m              of bad-pix\n"
+         "  without_truth, without_estimate   maps without a partner in time\n";
+}
+
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+/// Estimate, truth and error as images of values.
+struct ShownDepths {
+  cv::Mat1f estimate;
+  cv::Mat1f truth;
+  cv::Mat1f error;
+  std::vector<double> depths_m;  ///< Of the truth.
+  std::vector<double> errors_m;
+};
+
+ShownDepths shownDepths(const EvaluatedMap& map, const DepthEvaluationOptions& options) {
+  const ComparedDepths depths = readDepths(map, maskOf(options), options);
+  const cv::Size size = depths.truth.size();
+  ShownDepths shown{{size, kNone}, {size, kNone}, {size, kNone}, {}, {}};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (depths.hasTruth(y, x, options.pairing)) {
+        shown.truth(y, x) = depths.truth(y, x);
+        shown.depths_m.push_back(depths.truth(y, x));
+      }
+      if (!depths.hasEstimate(y, x)) continue;
+      shown.estimate(y, x) = depths.estimate(y, x);
+      const double truth_m = bestTruth(depths, {x, y}, options.pairing);
+      if (!(truth_m > 0)) continue;
+      shown.error(y, x) = static_cast<float>(std::abs(depths.estimate(y, x) - truth_m));
+      shown.errors_m.push_back(shown.error(y, x));
+    }
+  }
+  return shown;
+}
+
+const EvaluatedMap& typicalMap(const DepthEvaluation& evaluation) {
+  std::vector<const EvaluatedMap*> maps;
+  for (const EvaluatedMap& map : evaluation.maps) maps.push_back(&map);
+  const auto fewer = [](const EvaluatedMap* a, const EvaluatedMap* b) {
+    return a->errors.points < b->errors.points;
+  };
+  return *upperMedian(maps, fewer);
+}
+
+/// The range from the 1st to the 99th percentile.
+AxisRange usualRange(const std::vector<double>& values, AxisScale scale) {
+  if (values.empty()) return rangeAround({1}, scale);
+  AxisRange range{quantileOf(values, 0.01), quantileOf(values, 0.99), scale};
+  if (!(range.from < range.to)) range = rangeAround({range.from}, scale);
+  return range;
+}
+
+cv::Mat3b depthImages(const EvaluatedMap& map, const DepthEvaluationOptions& options) {
+  const ShownDepths shown = shownDepths(map, options);
+  const AxisRange depths = usualRange(shown.depths_m, AxisScale::kLogarithmic);
+  double max_error_m = quantileOf(shown.errors_m, shown.errors_m.empty() ? 1 : 0.95);
+  if (!(max_error_m > 0)) max_error_m = 0.01;
+  const std::string title = fmt::format("estimate {}, {} points", map.name, map.errors.points);
+  return sideBySide({drawValues({title, shown.estimate, depths, "m", Palette::kBrightToDark}),
+                     drawValues({"truth", shown.truth, depths, "m", Palette::kBrightToDark}),
+                     drawValues({"absolute error", shown.error, {0, max_error_m}, "m"})});
+}
+
+cv::Mat3b detectionPlot(const PrecisionRecall& detection) {
+  CurvePlot plot = fractionPlot(asJson(detection), "threshold_m",
+                                {{"precision", "precision"}, {"recall", "recall"}, {"f1", "F1"}});
+  plot.title = "precision, recall, F1";
+  plot.x.label = "error threshold [m]";
+  plot.y.label = "fraction [%]";
+  plot.size = {520, 380};
+  return drawCurves(plot);
+}
+
+/// The errors of each map over its time in the recording.
+cv::Mat3b errorsOverTime(const std::vector<EvaluatedMap>& maps) {
+  const std::int64_t start_ns = parseSeconds(maps.front().name).value_or(0);
+  std::vector<cv::Point2d> means;
+  std::vector<cv::Point2d> medians;
+  for (const EvaluatedMap& map : maps) {
+    if (map.errors.points == 0) continue;
+    const double t_s = secondsBetween(start_ns, parseSeconds(map.name).value_or(start_ns));
+    means.emplace_back(t_s, map.errors.mean_abs_m);
+    medians.emplace_back(t_s, map.errors.median_abs_m);
+  }
+  CurvePlot plot;
+  plot.title = "absolute error of the maps";
+  plot.x.label = "time since the first [s]";
+  plot.y.label = "error [m]";
+  plot.y.from = 0;
+  plot.curves = {{"mean", means, CurveStyle::kMarkedLine},
+                 {"median", medians, CurveStyle::kMarkedLine}};
+  plot.size = {520, 380};
+  return drawCurves(plot);
+}
+
+}  // namespace
+
+cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options) {
+  const cv::Mat3b curves = detectionPlot(evaluation.detection);
+  const bool several = evaluation.maps.size() > 1;
+  return oneBelowAnother(
+      {depthImages(typicalMap(evaluation), options),
+       several ? sideBySide({curves, errorsOverTime(evaluation.maps)}) : curves});
 }
 
 }  // namespace efm

@@ -3,8 +3,11 @@
 
 #include <opencv2/core.hpp>
 
+#include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
+#include <vector>
 
 namespace efm {
 
@@ -19,5 +22,35 @@ cv::Mat1f readDepthFile(const std::filesystem::path& file,
 
 /// Reads a mask from a PNG or TIFF image (`decodePicture`): 0 for black pixels, 255 for others.
 cv::Mat1b readMaskFile(const std::filesystem::path& file);
+
+/// For a folder: the first of these files that it has. For another path: the path itself.
+std::filesystem::path fileInFolder(const std::filesystem::path& path,
+                                   std::initializer_list<const char*> names);
+
+struct TimedFile {
+  std::int64_t t_ns = 0;
+  std::filesystem::path file;
+};
+
+/// Reads a list of files, in its order: a line is `t file`, with t in decimal seconds and the file
+/// relative to the list's folder. A # begins a comment.
+std::vector<TimedFile> timedFilesIn(const std::filesystem::path& list);
+
+/// A folder may hold estimated and true depth maps; the role selects one of them.
+enum class DepthSeriesRole { kEstimate, kTruth };
+
+/// The depth maps of a folder, in the order of time. They have the first of these forms that the
+/// folder has, with <t> in decimal seconds:
+///   keyframes/<t>/depth.tiff or <t>/depth.tiff   written by `map`
+///   depth/index.txt or index.txt                 a dataset's list, as `timedFilesIn` reads it
+///   <t>.tiff or NAME_<t>.tiff                    or .tif, .pfm, .npy, .png
+/// For truth, the dataset's list comes before the maps of `map`.
+std::vector<TimedFile> depthSeries(const std::filesystem::path& folder, DepthSeriesRole role);
+
+/// The file nearest in time to `t_ns`; of two equally near files the earlier. Null if none is
+/// within `within_ns`.
+/// @param series in the order of time.
+const TimedFile* nearestFile(const std::vector<TimedFile>& series, std::int64_t t_ns,
+                             std::int64_t within_ns);
 
 }  // namespace efm

@@ -2,7 +2,6 @@
 #include "plugin/evaluation/trajectory_evaluation.h"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include <array>
 #include <cmath>
@@ -13,15 +12,14 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "maps/metrics/sample_statistics.h"
-#include "plugin/evaluation/depth_series.h"
-#include "plugin/evaluation/text_table.h"
+#include "plugin/evaluation/depth_file.h"
+#include "plugin/evaluation/evaluation_text.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Unit = RelativeSpacing::Unit;
 
 constexpr double kDegrees = 180 / kPi;
@@ -50,26 +48,16 @@ Rigid3 aligned(const TrajectoryEvaluation& evaluation, const std::filesystem::pa
   }
 }
 
-std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& statistics,
-                               double factor) {
-  std::vector<std::string> row = {name, std::to_string(statistics.count)};
-  for (const double value : {statistics.rms, statistics.mean, statistics.median, statistics.stddev,
-                             statistics.min, statistics.max}) {
-    row.push_back(statistics.count > 0 ? fixedText(factor * value, 4) : "-");
-  }
-  return row;
-}
-
-Json asJson(const SampleStatistics& statistics, double factor) {
+EvaluationJson asJson(const SampleStatistics& statistics, double factor) {
   return {{"rmse", factor * statistics.rms},      {"mean", factor * statistics.mean},
           {"median", factor * statistics.median}, {"std", factor * statistics.stddev},
           {"min", factor * statistics.min},       {"max", factor * statistics.max}};
 }
 
-Json asJson(const EvaluatedSpacing& relative) {
-  Json json = {{"delta", relative.spacing.amount},
-               {"unit", nameIn(kSpacingUnits, relative.spacing.unit)},
-               {"pairs", relative.translation_m.count}};
+EvaluationJson asJson(const EvaluatedSpacing& relative) {
+  EvaluationJson json = {{"delta", relative.spacing.amount},
+                         {"unit", nameIn(kSpacingUnits, relative.spacing.unit)},
+                         {"pairs", relative.translation_m.count}};
   if (relative.translation_m.count == 0) return json;
   json["translation_m"] = asJson(relative.translation_m, 1);
   json["rotation_deg"] = asJson(relative.rotation_rad, kDegrees);
@@ -82,6 +70,32 @@ Json asJson(const EvaluatedSpacing& relative) {
 
 double durationOf(const TrajectoryEvaluation& evaluation) {
   return secondsBetween(evaluation.pairs.front().t_ns, evaluation.pairs.back().t_ns);
+}
+
+EvaluationJson asJson(const TrajectoryEvaluation& evaluation) {
+  const Rigid3& T_world_map = evaluation.T_world_map;
+  const Eigen::Quaterniond& q = T_world_map.rotation;
+  const Eigen::Vector3d& p = T_world_map.translation;
+  EvaluationJson json;
+  json["estimate_file"] = evaluation.estimate_file.string();
+  json["truth_file"] = evaluation.truth_file.string();
+  json["pairs"] = evaluation.pairs.size();
+  json["estimate_poses"] = evaluation.estimate_poses;
+  json["truth_poses"] = evaluation.truth_poses;
+  json["length_m"] = evaluation.true_length_m;
+  json["duration_s"] = durationOf(evaluation);
+  json["first_s"] = formatSeconds(evaluation.pairs.front().t_ns);
+  json["last_s"] = formatSeconds(evaluation.pairs.back().t_ns);
+  json["alignment"] = nameIn(kTrajectoryAlignments, evaluation.alignment);
+  json["aligned_by"] = {{"translation_m", {p.x(), p.y(), p.z()}},
+                        {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  json["ate"] = {{"translation_m", asJson(statisticsOf(evaluation.errors.translation_m), 1)},
+                 {"rotation_deg", asJson(statisticsOf(evaluation.errors.rotation_rad), kDegrees)}};
+  json["rpe"] = EvaluationJson::array();
+  for (const EvaluatedSpacing& relative : evaluation.relative) {
+    json["rpe"].push_back(asJson(relative));
+  }
+  return json;
 }
 
 /// What the alignment does, and the transform that it found.
@@ -153,46 +167,30 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
 }
 
 std::string evaluationTable(const TrajectoryEvaluation& evaluation) {
-  TextTable positions;
-  TextTable rotations;
-  positions.add({"position, m", "pairs", "rmse", "mean", "median", "std", "min", "max"});
-  rotations.add({"rotation, deg", "pairs", "rmse", "mean", "median", "std", "min", "max"});
-  positions.add(rowOf("absolute", statisticsOf(evaluation.errors.translation_m), 1));
-  rotations.add(rowOf("absolute", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
-  for (const EvaluatedSpacing& relative : evaluation.relative) {
-    const std::string name = fmt::format("over {:.{}f} {}", relative.spacing.amount,
-                                         relative.spacing.unit == Unit::kFrames ? 0 : 3,
-                                         nameIn(kSpacingUnits, relative.spacing.unit));
-    positions.add(rowOf(name, relative.translation_m, 1));
-    rotations.add(rowOf(name, relative.rotation_rad, kDegrees));
+  const EvaluationJson json = asJson(evaluation);
+  std::string text = comparedText(evaluation);
+  for (const auto& [title, key] :
+       {std::pair{"position, m", "translation_m"}, {"rotation, deg", "rotation_deg"}}) {
+    std::vector<TableColumn> columns = {{title, "name"}, {"pairs", "pairs"}};
+    for (const char* measure : {"rmse", "mean", "median", "std", "min", "max"}) {
+      columns.push_back({measure, measure, 4});
+    }
+    EvaluationJson rows = {json["ate"][key]};
+    rows[0].update({{"name", "absolute"}, {"pairs", json["pairs"]}});
+    for (const EvaluationJson& relative : json["rpe"]) {
+      const std::string unit = relative["unit"];
+      rows.push_back(relative.value(key, EvaluationJson::object()));
+      rows.back()["name"] =
+          fmt::format("over {:.{}f} {}", double(relative["delta"]), unit == "frames" ? 0 : 3, unit);
+      rows.back()["pairs"] = relative["pairs"];
+    }
+    text += "\n" + tableText(tableRows(columns, rows));
   }
-  return comparedText(evaluation) + "\n" + positions.text() + "\n" + rotations.text();
+  return text;
 }
 
 std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
-  const Rigid3& T_world_map = evaluation.T_world_map;
-  const Eigen::Quaterniond& q = T_world_map.rotation;
-  const Eigen::Vector3d& p = T_world_map.translation;
-  Json json;
-  json["estimate_file"] = evaluation.estimate_file.string();
-  json["truth_file"] = evaluation.truth_file.string();
-  json["pairs"] = evaluation.pairs.size();
-  json["estimate_poses"] = evaluation.estimate_poses;
-  json["truth_poses"] = evaluation.truth_poses;
-  json["length_m"] = evaluation.true_length_m;
-  json["duration_s"] = durationOf(evaluation);
-  json["first_s"] = formatSeconds(evaluation.pairs.front().t_ns);
-  json["last_s"] = formatSeconds(evaluation.pairs.back().t_ns);
-  json["alignment"] = nameIn(kTrajectoryAlignments, evaluation.alignment);
-  json["aligned_by"] = {{"translation_m", {p.x(), p.y(), p.z()}},
-                        {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
-  json["ate"] = {{"translation_m", asJson(statisticsOf(evaluation.errors.translation_m), 1)},
-                 {"rotation_deg", asJson(statisticsOf(evaluation.errors.rotation_rad), kDegrees)}};
-  json["rpe"] = Json::array();
-  for (const EvaluatedSpacing& relative : evaluation.relative) {
-    json["rpe"].push_back(asJson(relative));
-  }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return jsonText(asJson(evaluation));
 }
 
 std::string trajectoryEvaluationKeys() {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "plugin/evaluation/depth_evaluation.h"
-#include "plugin/evaluation/depth_series.h"
+#include "plugin/evaluation/depth_file.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

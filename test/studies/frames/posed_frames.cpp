@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/evaluation/depth_series.h"
+#include "plugin/evaluation/depth_file.h"
 #include "plugin/recordings/text/dataset_folder.h"
 
 namespace efm::studies {

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plugin/results/pictures/curve_plot.h"
+
+namespace efm {
+
+/// The errors of an evaluation, as --json prints them. Tables and plots show their numbers.
+using EvaluationJson = nlohmann::ordered_json;
+
+inline std::string jsonText(const EvaluationJson& json) {
+  return json.dump(2, ' ', false, EvaluationJson::error_handler_t::replace) + "\n";
+}
+
+/// A number with this number of decimals.
+inline std::string fixedText(double value, int decimals) {
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+/// A column of a table: the values of a key, numbers times a factor.
+struct TableColumn {
+  const char* name;
+  const char* key;
+  int decimals = 0;
+  double factor = 1;
+
+  /// @return "-" if the object has no such key.
+  std::string textIn(const EvaluationJson& object) const {
+    const auto found = object.find(key);
+    if (found == object.end()) return "-";
+    return found->is_string() ? std::string(*found) : fixedText(factor * double(*found), decimals);
+  }
+};
+
+using TableRow = std::vector<std::string>;
+
+/// A table as plain text, with two blanks between columns and none at the end of a line. The first
+/// column is aligned left, the others right. Missing cells stay empty.
+inline std::string tableText(const std::vector<TableRow>& rows) {
+  std::vector<std::size_t> widths;
+  for (const TableRow& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  }
+  std::string text;
+  for (const TableRow& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string blanks(widths[c] - row[c].size(), ' ');
+      line += c == 0 ? row[c] + blanks : "  " + blanks + row[c];
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+/// A heading, then a row per object of a list.
+inline std::vector<TableRow> tableRows(const std::vector<TableColumn>& columns,
+                                       const EvaluationJson& objects) {
+  std::vector<TableRow> rows(1 + objects.size());
+  for (const TableColumn& column : columns) {
+    rows[0].emplace_back(column.name);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      rows[i + 1].push_back(column.textIn(objects[i]));
+    }
+  }
+  return rows;
+}
+
+/// Fractions, in percent, over a distance or an error in metres.
+/// @param steps a list of objects.
+/// @param x_key the key of the metres.
+/// @param fractions key and label of each curve.
+inline CurvePlot fractionPlot(const EvaluationJson& steps, const char* x_key,
+                              const std::vector<std::pair<const char*, const char*>>& fractions) {
+  CurvePlot plot;
+  plot.x.scale = AxisScale::kLogarithmic;
+  plot.y.from = 0;
+  plot.y.to = 102;
+  for (const auto& [key, label] : fractions) {
+    std::vector<cv::Point2d> points;
+    for (const EvaluationJson& step : steps) {
+      points.emplace_back(step[x_key], 100 * double(step[key]));
+    }
+    std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
+    plot.curves.push_back({label, points, CurveStyle::kMarkedLine});
+  }
+  return plot;
+}
+
+}  // namespace efm
