@@ -43,27 +43,18 @@ class Messages : public efm::BagSource {
     if (!messages_.empty()) setLogTimes(0, timeOf(messages_.size() - 1));
   }
 
-  std::unique_ptr<efm::BagCursor> messages(std::size_t, std::int64_t from_log_ns) override {
-    return std::make_unique<Cursor>(*this, from_log_ns);
+  efm::BagCursor messages(std::size_t, std::int64_t from_log_ns) override {
+    std::size_t next = 0;
+    while (next < messages_.size() && timeOf(next) < from_log_ns) ++next;
+    return [this, next](efm::BagMessage& message) mutable {
+      if (next == messages_.size()) return false;
+      const std::vector<std::uint8_t>& bytes = messages_[next];
+      message = {timeOf(next++), bytes.data(), bytes.size(), cdr_};
+      return true;
+    };
   }
 
  private:
-  class Cursor : public efm::BagCursor {
-   public:
-    Cursor(const Messages& bag, std::int64_t from_log_ns) : bag_(bag) {
-      while (next_ < bag_.messages_.size() && timeOf(next_) < from_log_ns) ++next_;
-    }
-    bool next(efm::BagMessage& message) override {
-      if (next_ == bag_.messages_.size()) return false;
-      const std::vector<std::uint8_t>& bytes = bag_.messages_[next_];
-      message = {timeOf(next_++), bytes.data(), bytes.size(), bag_.cdr_};
-      return true;
-    }
-
-   private:
-    const Messages& bag_;
-    std::size_t next_ = 0;
-  };
   static std::int64_t timeOf(std::size_t index) {
     return static_cast<std::int64_t>(index) * kPeriodNs;
   }
@@ -75,7 +66,7 @@ class Messages : public efm::BagSource {
 void decodeAll(Messages& bag, efm::RosType type) {
   const auto cursor = bag.messages(0, 0);
   efm::BagMessage message;
-  while (cursor->next(message)) {
+  while (cursor(message)) {
     // The caller of these knows the file's name.
     efm::fuzz::readOrRefuse("", [&] {
       if (efm::hasPoses(type)) {

@@ -107,54 +107,37 @@ const std::uint8_t* unpackChunk(ChunkCompression compression, PackedChunk chunk,
   return result;
 }
 
-/// Reads the chunks that have the topic, one after the other.
-class ChunkedBag::Cursor : public BagCursor {
- public:
-  Cursor(ChunkedBag& bag, std::size_t topic, std::int64_t from_log_ns)
-      : bag_(bag), topic_(topic), from_log_ns_(from_log_ns), bit_(topicBit(topic)) {}
-
-  bool next(BagMessage& message) override {
-    while (true) {
-      while (chunk_ && next_message_ < chunk_->messages.size()) {
-        const ChunkMessages::Message& found = chunk_->messages[next_message_++];
-        if (found.topic != topic_ || (!begun_ && found.log_ns < from_log_ns_)) continue;
-        begun_ = true;
-        message = {found.log_ns, found.data, found.size, found.cdr};
-        return true;
-      }
-      chunk_.reset();
-      while (next_chunk_ < bag_.chunks_.size() && !isWanted(bag_.chunks_[next_chunk_])) {
-        ++next_chunk_;
-      }
-      if (next_chunk_ == bag_.chunks_.size()) return false;
-      chunk_ = bag_.chunk(next_chunk_++);
-      next_message_ = 0;
-    }
-  }
-
- private:
-  bool isWanted(const BagChunk& chunk) const {
-    return (chunk.topics & bit_) != 0 && (begun_ || chunk.last_log_ns >= from_log_ns_);
-  }
-
-  ChunkedBag& bag_;
-  std::size_t topic_;
-  std::int64_t from_log_ns_;
-  std::uint64_t bit_;
-  bool begun_ = false;  // there was a message
-  std::size_t next_chunk_ = 0;
-  std::shared_ptr<const ChunkMessages> chunk_;
-  std::size_t next_message_ = 0;
-};
-
 ChunkedBag::ChunkedBag(std::filesystem::path file, std::string_view repair)
     : BagSource(std::move(file)), repair_(repair), stream_(this->file(), std::ios::binary) {
   if (!stream_) throw std::runtime_error(this->file().string() + ": cannot be opened for reading");
   file_size_ = std::filesystem::file_size(this->file());
 }
 
-std::unique_ptr<BagCursor> ChunkedBag::messages(std::size_t topic, std::int64_t from_log_ns) {
-  return std::make_unique<Cursor>(*this, topic, from_log_ns);
+/// Reads the chunks that have the topic, one after the other.
+BagCursor ChunkedBag::messages(std::size_t topic, std::int64_t from_log_ns) {
+  bool begun = false;  // there was a message
+  std::size_t next_chunk = 0;
+  std::shared_ptr<const ChunkMessages> chunk;
+  std::size_t next_message = 0;
+  return [=](BagMessage& message) mutable {
+    const auto is_wanted = [&](const BagChunk& entry) {
+      return (entry.topics & topicBit(topic)) != 0 && (begun || entry.last_log_ns >= from_log_ns);
+    };
+    while (true) {
+      while (chunk && next_message < chunk->messages.size()) {
+        const ChunkMessages::Message& found = chunk->messages[next_message++];
+        if (found.topic != topic || (!begun && found.log_ns < from_log_ns)) continue;
+        begun = true;
+        message = {found.log_ns, found.data, found.size, found.cdr};
+        return true;
+      }
+      chunk.reset();
+      while (next_chunk < chunks_.size() && !is_wanted(chunks_[next_chunk])) ++next_chunk;
+      if (next_chunk == chunks_.size()) return false;
+      chunk = chunkAt(next_chunk++);
+      next_message = 0;
+    }
+  };
 }
 
 void ChunkedBag::setChunks(std::vector<BagChunk> chunks) {
@@ -170,7 +153,7 @@ void ChunkedBag::setChunks(std::vector<BagChunk> chunks) {
 }
 
 /// Cameras are read by turns, one some chunks before the other.
-std::shared_ptr<const ChunkMessages> ChunkedBag::chunk(std::size_t index) {
+std::shared_ptr<const ChunkMessages> ChunkedBag::chunkAt(std::size_t index) {
   const auto found = std::find_if(recent_.begin(), recent_.end(),
                                   [&](const auto& entry) { return entry.first == index; });
   if (found != recent_.end()) return found->second;

@@ -52,7 +52,7 @@ struct ChunkMessages {
 /// holds the list of chunks, the last ones that were read (8 MiB) and one chunk for each cursor.
 class ChunkedBag : public BagSource {
  public:
-  std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) override;
+  BagCursor messages(std::size_t topic, std::int64_t from_log_ns) override;
 
  protected:
   /// @param repair what damaged bags of this kind are repaired with, for errors; may be empty.
@@ -78,8 +78,7 @@ class ChunkedBag : public BagSource {
   }
 
  private:
-  class Cursor;
-  std::shared_ptr<const ChunkMessages> chunk(std::size_t index);
+  std::shared_ptr<const ChunkMessages> chunkAt(std::size_t index);
 
   std::string_view repair_;
   std::ifstream stream_;

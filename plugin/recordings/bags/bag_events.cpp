@@ -54,12 +54,12 @@ class BagEventDecoder {
 
   /// Takes the first 100 packets with events into account, for the sensor's clock. Nothing to do
   /// for EventArray: its events have the host's time. Never throws at damaged data.
-  void fitClock(BagCursor& cursor) {
+  void fitClock(const BagCursor& cursor) {
     if (type_ != RosType::kEventPacket) return;
     BagMessage message;
     std::vector<Event> events;
     try {
-      for (int packets = 0; packets < kClockPackets && cursor.next(message);) {
+      for (int packets = 0; packets < kClockPackets && cursor(message);) {
         const EventPacketMessage packet = decodeEventPacket(message);
         events.clear();
         decodePacket(packet, events);
@@ -166,7 +166,7 @@ class BagEvents : public EventStream {
     assert(!parts.empty());
     for (const BagTopicPart& topic : parts) {
       Part part = {topic, BagEventDecoder(topic.bag->topics()[topic.topic])};
-      part.decoder.fitClock(*topic.bag->messages(topic.topic, kMinTimeNs));
+      part.decoder.fitClock(topic.bag->messages(topic.topic, kMinTimeNs));
       if (!size_) size_ = firstSize(part);
       // The next bag of a recording goes on with the same clock.
       if (!parts_.empty()) {
@@ -235,22 +235,19 @@ class BagEvents : public EventStream {
     return (static_cast<double>(part_) + part) / static_cast<double>(parts_.size());
   }
   std::optional<CameraSize> size() const override { return size_; }
-  std::uint64_t lostPackets() const override {
-    std::uint64_t lost = 0;
-    for (const Part& part : parts_) lost += part.decoder.lostPackets();
-    return lost;
-  }
-  std::uint64_t undatedEvents() const override {
-    std::uint64_t undated = 0;
-    for (const Part& part : parts_) undated += part.decoder.undatedEvents();
-    return undated;
-  }
+  std::uint64_t lostPackets() const override { return sumOf(&BagEventDecoder::lostPackets); }
+  std::uint64_t undatedEvents() const override { return sumOf(&BagEventDecoder::undatedEvents); }
 
  private:
   struct Part {
     BagTopicPart topic;
     BagEventDecoder decoder;
   };
+  std::uint64_t sumOf(std::uint64_t (BagEventDecoder::*count)() const) const {
+    std::uint64_t sum = 0;
+    for (const Part& part : parts_) sum += (part.decoder.*count)();
+    return sum;
+  }
   /// Continues with the messages of a part that were recorded from a time on.
   void begin(std::size_t part, std::int64_t from_log_ns) {
     part_ = part;
@@ -259,7 +256,7 @@ class BagEvents : public EventStream {
     parts_[part].decoder.restart(from_log_ns > parts_[part].topic.bag->firstLogNs());
   }
   bool nextMessage(BagMessage& message) {
-    while (!cursor_->next(message)) {
+    while (!cursor_(message)) {
       if (part_ + 1 == parts_.size()) return false;
       begin(part_ + 1, kMinTimeNs);
     }
@@ -273,7 +270,7 @@ class BagEvents : public EventStream {
     BagMessage message;
     std::vector<Event> events;
     try {
-      if (cursor->next(message)) decoder.decode(message, events);
+      if (cursor(message)) decoder.decode(message, events);
     } catch (const std::runtime_error&) {
       // Reading comes to it.
     }
@@ -286,7 +283,7 @@ class BagEvents : public EventStream {
     decoder.restart(true);
     BagMessage message;
     std::vector<Event> events;
-    while (cursor->next(message)) {
+    while (cursor(message)) {
       decoder.decode(message, events);
       if (!events.empty()) return events.front().t_ns;
     }
@@ -313,7 +310,7 @@ class BagEvents : public EventStream {
   std::vector<Part> parts_;
   std::optional<CameraSize> size_;
   std::size_t part_ = 0;
-  std::unique_ptr<BagCursor> cursor_;
+  BagCursor cursor_;
   std::int64_t log_ns_;  // of the last message
   /// The messages of the last block: the index of its first event, the part and the log time.
   struct MessagePlace {

@@ -174,7 +174,7 @@ std::string forMessages(const RosTopic& topic, const Take& take) {
     std::string damage;
     const auto next = [&] {
       try {
-        return cursor->next(message);
+        return cursor(message);
       } catch (const std::runtime_error& error) {
         damage = error.what();
         return false;

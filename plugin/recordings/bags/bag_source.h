@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -27,14 +28,9 @@ struct BagMessage {
   bool cdr = false;
 };
 
-/// The messages of one topic.
-class BagCursor {
- public:
-  virtual ~BagCursor() = default;
-  /// The next message in the order of the recording. Its bytes stay valid until the next call.
-  /// @return false at the end.
-  virtual bool next(BagMessage& message) = 0;
-};
+/// Takes the next message of a topic, in the order of the recording. Its bytes stay valid until the
+/// next call. Returns false at the end.
+using BagCursor = std::function<bool(BagMessage& message)>;
 
 /// A file of recorded ROS messages. Cursors are independent of each other and do not outlive it.
 class BagSource {
@@ -53,7 +49,7 @@ class BagSource {
   /// @param topic index in `topics`.
   /// @param from_log_ns messages that were recorded earlier are left out. Cost: one search in the
   /// bag's index.
-  virtual std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) = 0;
+  virtual BagCursor messages(std::size_t topic, std::int64_t from_log_ns) = 0;
 
  protected:
   /// @return its index, the same for a topic of the same name and type.

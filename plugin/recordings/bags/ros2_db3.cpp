@@ -92,10 +92,9 @@ class Db3Bag : public BagSource {
     if (first.next() && last.next()) setLogTimes(logTime(first), logTime(last));
   }
 
-  std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) override;
+  BagCursor messages(std::size_t topic, std::int64_t from_log_ns) override;
 
  private:
-  class Cursor;
   void open();
 
   std::string name_;
@@ -128,31 +127,8 @@ void Db3Bag::open() {
                 static_cast<int>(std::min<std::uintmax_t>(size, std::numeric_limits<int>::max())));
 }
 
-class Db3Bag::Cursor : public BagCursor {
- public:
-  Cursor(Db3Bag& bag, std::int64_t topic, std::int64_t first_id)
-      : query_(bag.database_.get(), bag.name_,
-               "SELECT timestamp, data FROM messages WHERE id >= ? AND topic_id = ? ORDER BY id") {
-    query_.bind(1, first_id).bind(2, topic);
-  }
-
-  bool next(BagMessage& message) override {
-    if (ended_ || !query_.next()) {
-      ended_ = true;
-      return false;
-    }
-    const auto [data, size] = query_.bytes(1);
-    message = {logTime(query_), data, size, true};
-    return true;
-  }
-
- private:
-  SqlQuery query_;
-  bool ended_ = false;
-};
-
 /// Messages come in the order of their ids, that of the recording: reading by time would jump.
-std::unique_ptr<BagCursor> Db3Bag::messages(std::size_t topic, std::int64_t from_log_ns) {
+BagCursor Db3Bag::messages(std::size_t topic, std::int64_t from_log_ns) {
   std::int64_t first_id = std::numeric_limits<std::int64_t>::min();
   if (from_log_ns > firstLogNs()) {
     SqlQuery query(database_.get(), name_,
@@ -160,7 +136,17 @@ std::unique_ptr<BagCursor> Db3Bag::messages(std::size_t topic, std::int64_t from
     first_id = query.bind(1, from_log_ns).next() ? query.number(0)
                                                  : std::numeric_limits<std::int64_t>::max();
   }
-  return std::make_unique<Cursor>(*this, ids_[topic], first_id);
+  auto query = std::make_shared<SqlQuery>(
+      database_.get(), name_,
+      "SELECT timestamp, data FROM messages WHERE id >= ? AND topic_id = ? ORDER BY id");
+  query->bind(1, first_id).bind(2, ids_[topic]);
+  return [query, ended = false](BagMessage& message) mutable {
+    ended = ended || !query->next();
+    if (ended) return false;
+    const auto [data, size] = query->bytes(1);
+    message = {logTime(*query), data, size, true};
+    return true;
+  };
 }
 
 }  // namespace

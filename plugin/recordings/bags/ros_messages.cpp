@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"
@@ -19,20 +20,16 @@
 namespace efm {
 namespace {
 
-struct NamedRosType {
-  std::string_view name;
-  RosType type;
-};
-constexpr NamedRosType kRosTypes[] = {
-    {"dvs_msgs/EventArray", RosType::kEventArray},
-    {"prophesee_event_msgs/EventArray", RosType::kEventArray},
-    {"event_camera_msgs/EventPacket", RosType::kEventPacket},
-    {"event_array_msgs/EventArray", RosType::kEventPacket},
-    {"geometry_msgs/PoseStamped", RosType::kPose},
-    {"geometry_msgs/PoseWithCovarianceStamped", RosType::kPoseWithCovariance},
-    {"geometry_msgs/TransformStamped", RosType::kTransform},
-    {"nav_msgs/Odometry", RosType::kOdometry},
-    {"sensor_msgs/CameraInfo", RosType::kCameraInfo},
+constexpr NamedChoice<RosType> kRosTypes[] = {
+    {RosType::kEventArray, "dvs_msgs/EventArray"},
+    {RosType::kEventArray, "prophesee_event_msgs/EventArray"},
+    {RosType::kEventPacket, "event_camera_msgs/EventPacket"},
+    {RosType::kEventPacket, "event_array_msgs/EventArray"},
+    {RosType::kPose, "geometry_msgs/PoseStamped"},
+    {RosType::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped"},
+    {RosType::kTransform, "geometry_msgs/TransformStamped"},
+    {RosType::kOdometry, "nav_msgs/Odometry"},
+    {RosType::kCameraInfo, "sensor_msgs/CameraInfo"},
 };
 
 /// The fields of a message, in either serialisation.
@@ -151,8 +148,8 @@ void forWords(const EventPacketMessage& packet, const Take& take) {
 }  // namespace
 
 RosType rosTypeOf(std::string_view type) {
-  for (const NamedRosType& known : kRosTypes) {
-    if (known.name == type) return known.type;
+  for (const auto& known : kRosTypes) {
+    if (known.name == type) return known.value;
   }
   return RosType::kOther;
 }

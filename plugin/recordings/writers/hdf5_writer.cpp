@@ -25,6 +25,16 @@ void require(bool done, const char* what) {
   if (!done) throw std::runtime_error(what + hdf5Cause());
 }
 
+/// Calls `write`; its errors name the file.
+template <typename Write>
+void naming(const fs::path& file, const Write& write) {
+  try {
+    write();
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
 /// What DSEC's files have: Blosc with shuffled bytes and Zstandard.
 Hdf5Id chunkProperties(std::size_t number_bytes) {
   constexpr H5Z_filter_t kBlosc = 32001;
@@ -185,36 +195,23 @@ class Hdf5Writer : public RecordingWriter {
       : folder_(folder), poses_(folder_.temporary() / "poses.txt") {
     writeCamchain(folder_.temporary(), rig);
     for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
-      const fs::path path = folder_.temporary() / "events" / cameraName(camera);
-      fs::create_directories(path);
-      try {
-        cameras_.emplace_back(path / "events.h5");
-      } catch (const std::runtime_error& error) {
-        throw std::runtime_error(
-            fmt::format("{}: {}", (path / "events.h5").string(), error.what()));
-      }
+      const fs::path file = folder_.temporary() / "events" / cameraName(camera) / "events.h5";
+      fs::create_directories(file.parent_path());
+      naming(file, [&] { cameras_.emplace_back(file); });
     }
   }
 
   void addEvents(std::size_t camera, const std::vector<Event>& events) override {
     Hdf5Camera& file = cameras_.at(camera);
-    try {
+    naming(file.path(), [&] {
       for (const Event& event : events) file.add(event);
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(fmt::format("{}: {}", file.path().string(), error.what()));
-    }
+    });
   }
 
   void addPose(const StampedPose& pose) override { poses_.add(pose); }
 
   void close() override {
-    for (Hdf5Camera& camera : cameras_) {
-      try {
-        camera.close();
-      } catch (const std::runtime_error& error) {
-        throw std::runtime_error(fmt::format("{}: {}", camera.path().string(), error.what()));
-      }
-    }
+    for (Hdf5Camera& camera : cameras_) naming(camera.path(), [&] { camera.close(); });
     poses_.close();
     folder_.finish();
   }

@@ -4,9 +4,7 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstddef>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -20,33 +18,57 @@
 namespace efm {
 namespace {
 
-/// Appends a number as the machine has it: little-endian.
-template <typename T>
-void appendNumber(std::string& bytes, T value) {
-  static_assert(std::is_arithmetic_v<T>);
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+template <typename Number>
+void appendNumber(std::string& bytes, Number value) {
+  static_assert(std::is_arithmetic_v<Number>);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(Number));  // little-endian machines
+}
+
+/// The fields of an MCAP record: numbers, and texts after their size.
+template <typename... Fields>
+std::string fieldsOf(const Fields&... fields) {
+  std::string bytes;
+  const auto append = [&](const auto& field) {
+    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(field)>>) {
+      appendNumber(bytes, field);
+    } else {
+      const std::string_view text = field;
+      appendNumber(bytes, static_cast<std::uint32_t>(text.size()));
+      bytes.append(text);
+    }
+  };
+  (append(fields), ...);
+  return bytes;
+}
+
+std::string mcapRecord(McapOp op, const std::string& content) {
+  return static_cast<char>(op) + fieldsOf(std::uint64_t{content.size()}) + content;
 }
 
 /// A ROS 2 message in CDR: values at multiples of their size from the end of the header of 4 bytes.
 class CdrWriter {
  public:
-  template <typename T>
-  CdrWriter& number(T value) {
-    const std::size_t over = (bytes_.size() - kHeader) % sizeof(T);
-    if (over > 0) bytes_.append(sizeof(T) - over, '\0');
-    appendNumber(bytes_, value);
-    return *this;
-  }
-  /// Ends with a zero.
-  CdrWriter& text(std::string_view text) {
-    number(static_cast<std::uint32_t>(text.size() + 1));
-    bytes_.append(text).push_back('\0');
+  /// Adds numbers, and texts, which end with a zero.
+  template <typename... Values>
+  CdrWriter& add(const Values&... values) {
+    (addOne(values), ...);
     return *this;
   }
   /// The whole message, also to append bytes.
   std::string& bytes() { return bytes_; }
 
  private:
+  void addOne(std::string_view text) {
+    addOne(static_cast<std::uint32_t>(text.size() + 1));
+    bytes_.append(text).push_back('\0');
+  }
+  template <typename Number, typename = std::enable_if_t<std::is_arithmetic_v<Number>>>
+  void addOne(Number value) {
+    const std::size_t over = (bytes_.size() - kHeader) % sizeof(Number);
+    if (over > 0) bytes_.append(sizeof(Number) - over, '\0');
+    appendNumber(bytes_, value);
+  }
+
   static constexpr std::size_t kHeader = 4;
   std::string bytes_ = std::string("\0\1\0\0", kHeader);  // little-endian
 };
@@ -90,67 +112,45 @@ std::uint32_t checksumOf(std::string_view bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-void appendText(std::string& bytes, std::string_view text) {
-  appendNumber(bytes, static_cast<std::uint32_t>(text.size()));
-  bytes.append(text);
-}
-
-std::string mcapRecord(McapOp op, std::string_view content) {
-  std::string record(1, static_cast<char>(op));
-  appendNumber(record, static_cast<std::uint64_t>(content.size()));
-  return record.append(content);
-}
-
-/// The channels of a camera come after that of the poses.
+/// The channels of a camera come after that of the poses: events, camera info.
 std::uint16_t eventsChannel(std::size_t camera) {
   return static_cast<std::uint16_t>(kPoseChannel + 1 + 2 * camera);
-}
-std::uint16_t infoChannel(std::size_t camera) {
-  return static_cast<std::uint16_t>(eventsChannel(camera) + 1);
 }
 
 std::string frameOf(std::size_t camera) { return fmt::format("cam{}", camera); }
 
-void addHeader(CdrWriter& message, std::uint32_t seconds, std::int64_t t_ns,
-               std::string_view frame) {
-  message.number(seconds).number(static_cast<std::uint32_t>(t_ns % kNanosecondsPerSecond));
-  message.text(frame);
+void addSize(CdrWriter& message, const CameraModel& model) {
+  message.add(static_cast<std::uint32_t>(model.height), static_cast<std::uint32_t>(model.width));
 }
 
 void addCamera(CdrWriter& message, const CameraModel& model) {
-  message.number(static_cast<std::uint32_t>(model.height));
-  message.number(static_cast<std::uint32_t>(model.width));
-  message.text(model.distortion == DistortionModel::kEquidistant ? "equidistant" : "plumb_bob");
-  message.number(static_cast<std::uint32_t>(model.coefficients.size()));
-  for (const double value : model.coefficients) message.number(value);
-  for (const double k : {model.fx, 0.0, model.cx, 0.0, model.fy, model.cy, 0.0, 0.0, 1.0}) {
-    message.number(k);
-  }
-  for (const double r : {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}) message.number(r);
-  for (const double p :
-       {model.fx, 0.0, model.cx, 0.0, 0.0, model.fy, model.cy, 0.0, 0.0, 0.0, 1.0, 0.0}) {
-    message.number(p);
-  }
-  for (int i = 0; i < 6; ++i) message.number(std::uint32_t{0});  // binning, region of interest
-  message.number(std::uint8_t{0});
+  addSize(message, model);
+  message.add(model.distortion == DistortionModel::kEquidistant ? "equidistant" : "plumb_bob");
+  message.add(static_cast<std::uint32_t>(model.coefficients.size()));
+  for (const double value : model.coefficients) message.add(value);
+  const double fx = model.fx, fy = model.fy, cx = model.cx, cy = model.cy;
+  message.add(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);                 // K
+  message.add(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);             // R
+  message.add(fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0);  // P
+  message.add(0U, 0U, 0U, 0U, 0U, 0U, std::uint8_t{0});  // binning, region of interest
 }
 
 class McapWriter : public RecordingWriter {
  public:
   McapWriter(const std::filesystem::path& file, const Rig& rig)
-      : file_(file), rig_(rig), next_sequence_(rig.cameras.size()) {
-    stream_.open(file_.temporary(), std::ios::binary);
-    if (!stream_) throw std::runtime_error(file.string() + ": cannot be made");
-    addChannel("geometry_msgs/msg/PoseStamped", kPoseStampedSchema, "/pose");
+      : file_(file),
+        output_(file_.temporary(), file_.path()),
+        rig_(rig),
+        next_sequence_(rig.cameras.size()) {
+    channels_.push_back({"geometry_msgs/msg/PoseStamped", kPoseStampedSchema, "/pose"});
     for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
       const std::string name = "/" + frameOf(camera);
-      addChannel("event_camera_msgs/msg/EventPacket", kEventPacketSchema, name + "/events");
-      addChannel("sensor_msgs/msg/CameraInfo", kCameraInfoSchema, name + "/camera_info");
+      channels_.push_back(
+          {"event_camera_msgs/msg/EventPacket", kEventPacketSchema, name + "/events"});
+      channels_.push_back({"sensor_msgs/msg/CameraInfo", kCameraInfoSchema, name + "/camera_info"});
     }
-    std::string header;
-    appendText(header, "ros2");
-    appendText(header, "event-fusion-mapper");
-    write(std::string(kMcapMagic) + mcapRecord(McapOp::kHeader, header) + channelRecords());
+    write(std::string(kMcapMagic) +
+          mcapRecord(McapOp::kHeader, fieldsOf("ros2", "event-fusion-mapper")) + channelRecords());
   }
 
   void addEvents(std::size_t camera, const std::vector<Event>& events) override {
@@ -168,31 +168,23 @@ class McapWriter : public RecordingWriter {
   }
 
   void addPose(const StampedPose& pose) override {
-    CdrWriter message;
-    addHeader(message, stampSeconds(pose.t_ns), pose.t_ns, "world");
-    for (const double value : pose.T_world_rig.translation) message.number(value);
-    for (const double value : pose.T_world_rig.rotation.coeffs()) message.number(value);  // x y z w
+    CdrWriter message = messageAt(pose.t_ns, "world");
+    for (const double value : pose.T_world_rig.translation) message.add(value);
+    for (const double value : pose.T_world_rig.rotation.coeffs()) message.add(value);  // x y z w
     addMessage(kPoseChannel, pose.t_ns, message.bytes());
   }
 
   void close() override {
     finishChunk();
-    std::string end;
-    appendNumber(end, std::uint32_t{0});  // no checksum of the data: the chunks have theirs
-    write(mcapRecord(McapOp::kDataEnd, end));
-
-    std::string summary = channelRecords();
-    for (const std::string& index : chunk_indexes_) summary += index;
-    summary += statistics();
-    std::string footer(1, static_cast<char>(McapOp::kFooter));
-    appendNumber(footer, static_cast<std::uint64_t>(kMcapFooterContent));
-    appendNumber(footer, position_);
-    appendNumber(footer, std::uint64_t{0});  // no summary offsets
-    summary += footer;
+    // No checksum of the data: the chunks have theirs.
+    write(mcapRecord(McapOp::kDataEnd, fieldsOf(std::uint32_t{0})));
+    std::string summary = channelRecords() + chunk_indexes_ + statistics();
+    summary += static_cast<char>(McapOp::kFooter);
+    constexpr std::uint64_t kNoOffsets = 0;
+    summary += fieldsOf(std::uint64_t{kMcapFooterContent}, position_, kNoOffsets);
     appendNumber(summary, checksumOf(summary));
     write(summary.append(kMcapMagic));
-    stream_.close();
-    requireWritten();
+    output_.close();
     file_.replace();
   }
 
@@ -202,77 +194,57 @@ class McapWriter : public RecordingWriter {
     std::string schema;
     std::string topic;
     std::uint64_t messages = 0;
-    std::string index;  // of the chunk: time and position of each message
+    std::string index = {};  // of the chunk: time and position of each message
   };
   struct Span {
-    std::uint64_t first_ns = 0;
+    std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max();
     std::uint64_t last_ns = 0;
-    bool empty = true;
     void add(std::uint64_t t_ns) {
-      first_ns = empty ? t_ns : std::min(first_ns, t_ns);
-      last_ns = empty ? t_ns : std::max(last_ns, t_ns);
-      empty = false;
+      first_ns = std::min(first_ns, t_ns);
+      last_ns = std::max(last_ns, t_ns);
     }
   };
-
-  std::uint16_t addChannel(const char* schema_name, const char* schema, const std::string& topic) {
-    channels_.push_back({schema_name, schema, topic, 0, {}});
-    return static_cast<std::uint16_t>(channels_.size());
-  }
 
   /// Each channel has a schema of its own, with the channel's id.
   std::string channelRecords() const {
-    std::string records;
+    std::string schemas;
+    std::string channels;
     std::uint16_t id = 0;
     for (const Channel& channel : channels_) {
-      std::string schema;
-      appendNumber(schema, ++id);
-      appendText(schema, channel.schema_name);
-      appendText(schema, "ros2msg");
-      appendText(schema, channel.schema);
-      records += mcapRecord(McapOp::kSchema, schema);
+      ++id;
+      schemas +=
+          mcapRecord(McapOp::kSchema, fieldsOf(id, channel.schema_name, "ros2msg", channel.schema));
+      const char* metadata = "";
+      channels += mcapRecord(McapOp::kChannel, fieldsOf(id, id, channel.topic, "cdr", metadata));
     }
-    id = 0;
-    for (const Channel& channel : channels_) {
-      std::string content;
-      appendNumber(content, ++id);
-      appendNumber(content, id);
-      appendText(content, channel.topic);
-      appendText(content, "cdr");
-      appendText(content, "");  // metadata
-      records += mcapRecord(McapOp::kChannel, content);
-    }
-    return records;
+    return schemas + channels;
   }
 
-  std::uint32_t stampSeconds(std::int64_t t_ns) const {
+  /// A message with its header alone.
+  CdrWriter messageAt(std::int64_t t_ns, std::string_view frame) const {
     const std::int64_t seconds = t_ns / kNanosecondsPerSecond;
-    if (t_ns >= 0 && seconds <= std::numeric_limits<std::int32_t>::max()) {
-      return static_cast<std::uint32_t>(seconds);
+    if (t_ns < 0 || seconds > std::numeric_limits<std::int32_t>::max()) {
+      throw std::runtime_error(
+          fmt::format("{}: a time of {} s: expected 0 to 2147483647, as ROS has it",
+                      file_.path().string(), formatSeconds(t_ns)));
     }
-    throw std::runtime_error(
-        fmt::format("{}: a time of {} s: expected 0 to 2147483647, as ROS has it",
-                    file_.path().string(), formatSeconds(t_ns)));
+    return CdrWriter().add(static_cast<std::uint32_t>(seconds),
+                           static_cast<std::uint32_t>(t_ns % kNanosecondsPerSecond), frame);
   }
 
   void addPacket(std::size_t camera, const Event* begin, const Event* end) {
     const CameraModel& model = rig_.cameras.at(camera).model;
     const std::int64_t t_ns = begin->t_ns;
-    const std::uint32_t seconds = stampSeconds(t_ns);
+    CdrWriter packet = messageAt(t_ns, frameOf(camera));
     std::uint64_t& sequence = next_sequence_[camera];
     if (sequence == 0 && model.fx > 0) {  // calibrated
-      CdrWriter info;
-      addHeader(info, seconds, t_ns, frameOf(camera));
+      CdrWriter info = packet;
       addCamera(info, model);
-      addMessage(infoChannel(camera), t_ns, info.bytes());
+      addMessage(eventsChannel(camera) + 1, t_ns, info.bytes());
     }
-    CdrWriter packet;
-    addHeader(packet, seconds, t_ns, frameOf(camera));
-    packet.number(static_cast<std::uint32_t>(model.height));
-    packet.number(static_cast<std::uint32_t>(model.width));
-    packet.number(sequence++).number(static_cast<std::uint64_t>(t_ns)).text("mono");
-    packet.number(std::uint8_t{0});
-    packet.number(static_cast<std::uint32_t>((end - begin) * 8));
+    addSize(packet, model);
+    packet.add(sequence++, static_cast<std::uint64_t>(t_ns), "mono", std::uint8_t{0},
+               static_cast<std::uint32_t>((end - begin) * 8));
     for (const Event* event = begin; event != end; ++event) {
       constexpr std::uint16_t kMaxRow = 0x7fff;
       if (event->y > kMaxRow) {
@@ -287,20 +259,17 @@ class McapWriter : public RecordingWriter {
     addMessage(eventsChannel(camera), t_ns, packet.bytes());
   }
 
-  void addMessage(std::uint16_t channel, std::int64_t t_ns, const std::string& data) {
+  void addMessage(int channel, std::int64_t t_ns, const std::string& data) {
     const auto log_ns = static_cast<std::uint64_t>(t_ns);
-    Channel& entry = channels_[channel - 1U];
-    appendNumber(entry.index, log_ns);
-    appendNumber(entry.index, static_cast<std::uint64_t>(chunk_.size()));
-    std::string head;
-    appendNumber(head, channel);
-    appendNumber(head, static_cast<std::uint32_t>(entry.messages++));
-    appendNumber(head, log_ns);
-    appendNumber(head, log_ns);  // published
+    Channel& entry = channels_[static_cast<std::size_t>(channel - 1)];
+    entry.index += fieldsOf(log_ns, std::uint64_t{chunk_.size()});
+    const auto number = static_cast<std::uint32_t>(entry.messages++);
+    const std::uint64_t published_ns = log_ns;
+    const std::string head =
+        fieldsOf(static_cast<std::uint16_t>(channel), number, log_ns, published_ns);
     chunk_.push_back(static_cast<char>(McapOp::kMessage));
-    appendNumber(chunk_, static_cast<std::uint64_t>(head.size() + data.size()));
-    chunk_ += head;
-    chunk_ += data;
+    appendNumber(chunk_, std::uint64_t{head.size() + data.size()});
+    chunk_.append(head).append(data);
     chunk_span_.add(log_ns);
     file_span_.add(log_ns);
     if (chunk_.size() >= kMcapChunkBytes) finishChunk();
@@ -309,24 +278,17 @@ class McapWriter : public RecordingWriter {
   void finishChunk() {
     if (chunk_.empty()) return;
     std::string packed(ZSTD_compressBound(chunk_.size()), '\0');
-    const std::size_t size =
+    const std::uint64_t size =
         ZSTD_compress(packed.data(), packed.size(), chunk_.data(), chunk_.size(), kZstdLevel);
     if (ZSTD_isError(size) != 0) {
       throw std::runtime_error(file_.path().string() + ": " + ZSTD_getErrorName(size));
     }
     packed.resize(size);
-
-    std::string index;
-    appendNumber(index, chunk_span_.first_ns);
-    appendNumber(index, chunk_span_.last_ns);
-    std::string content = index;
-    appendNumber(content, static_cast<std::uint64_t>(chunk_.size()));
-    appendNumber(content, checksumOf(chunk_));
-    appendText(content, "zstd");
-    appendNumber(content, static_cast<std::uint64_t>(packed.size()));
-    content += packed;
+    const std::uint64_t unpacked_size = chunk_.size();
+    const std::string times = fieldsOf(chunk_span_.first_ns, chunk_span_.last_ns);
     const std::uint64_t begin = position_;
-    write(mcapRecord(McapOp::kChunk, content));
+    write(mcapRecord(McapOp::kChunk,
+                     times + fieldsOf(unpacked_size, checksumOf(chunk_), "zstd", size) + packed));
 
     const std::uint64_t end = position_;
     std::string positions;
@@ -334,22 +296,14 @@ class McapWriter : public RecordingWriter {
     for (Channel& channel : channels_) {
       ++id;
       if (channel.index.empty()) continue;
-      appendNumber(positions, id);
-      appendNumber(positions, position_);
-      std::string messages;
-      appendNumber(messages, id);
-      appendText(messages, channel.index);
-      write(mcapRecord(McapOp::kMessageIndex, messages));
+      positions += fieldsOf(id, position_);
+      write(mcapRecord(McapOp::kMessageIndex, fieldsOf(id, channel.index)));
       channel.index.clear();
     }
-    appendNumber(index, begin);
-    appendNumber(index, end - begin);
-    appendText(index, positions);
-    appendNumber(index, position_ - end);
-    appendText(index, "zstd");
-    appendNumber(index, static_cast<std::uint64_t>(packed.size()));
-    appendNumber(index, static_cast<std::uint64_t>(chunk_.size()));
-    chunk_indexes_.push_back(mcapRecord(McapOp::kChunkIndex, index));
+    chunk_indexes_ += mcapRecord(McapOp::kChunkIndex,
+                                 times + fieldsOf(begin, end - begin, positions, position_ - end,
+                                                  "zstd", size, unpacked_size));
+    ++chunks_;
     chunk_.clear();
     chunk_span_ = {};
   }
@@ -360,38 +314,23 @@ class McapWriter : public RecordingWriter {
     std::uint16_t id = 0;
     for (const Channel& channel : channels_) {
       messages += channel.messages;
-      appendNumber(counts, ++id);
-      appendNumber(counts, channel.messages);
+      counts += fieldsOf(++id, channel.messages);
     }
-    std::string content;
-    appendNumber(content, messages);
-    appendNumber(content, static_cast<std::uint16_t>(channels_.size()));  // schemas
-    appendNumber(content, static_cast<std::uint32_t>(channels_.size()));
-    appendNumber(content, std::uint32_t{0});  // attachments
-    appendNumber(content, std::uint32_t{0});  // metadata
-    appendNumber(content, static_cast<std::uint32_t>(chunk_indexes_.size()));
-    appendNumber(content, file_span_.first_ns);
-    appendNumber(content, file_span_.last_ns);
-    appendText(content, counts);
-    return mcapRecord(McapOp::kStatistics, content);
+    constexpr std::uint32_t kNone = 0;  // attachments, metadata
+    const auto schemas = static_cast<std::uint16_t>(channels_.size());
+    return mcapRecord(McapOp::kStatistics,
+                      fieldsOf(messages, schemas, std::uint32_t{schemas}, kNone, kNone, chunks_,
+                               messages > 0 ? file_span_.first_ns : 0, file_span_.last_ns, counts));
   }
 
   void write(const std::string& bytes) {
-    stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    output_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     position_ += bytes.size();
-    requireWritten();
-  }
-
-  /// @throws std::runtime_error if the last bytes could not be written.
-  void requireWritten() const {
-    if (stream_) return;
-    const std::string why = reasonNotWritten(errno);
-    throw std::runtime_error(file_.path().string() + ": " +
-                             (why.empty() ? "cannot be written" : why));
+    output_.requireWritten();
   }
 
   AtomicFile file_;
-  std::ofstream stream_;
+  OutputFile output_;
   std::uint64_t position_ = 0;
   Rig rig_;
   std::vector<Channel> channels_;             // id 1 is the first
@@ -399,7 +338,8 @@ class McapWriter : public RecordingWriter {
   std::string chunk_;                         // records
   Span chunk_span_;
   Span file_span_;
-  std::vector<std::string> chunk_indexes_;
+  std::string chunk_indexes_;  // records
+  std::uint32_t chunks_ = 0;
 };
 
 }  // namespace

@@ -11,19 +11,19 @@
 
 namespace efm {
 
-TextFile::TextFile(std::filesystem::path path)
-    : path_(std::move(path)), stream_(path_, std::ios::binary) {
-  if (!stream_) throw std::runtime_error(path_.string() + ": cannot be made");
+OutputFile::OutputFile(const std::filesystem::path& path, std::filesystem::path name)
+    : name_(std::move(name)), stream_(path, std::ios::binary) {
+  if (!stream_) throw std::runtime_error(name_.string() + ": cannot be made");
 }
 
-void TextFile::close() {
+void OutputFile::close() {
   stream_.close();
   requireWritten();
 }
 
 void PoseTextFile::add(const StampedPose& pose) {
   if (!file_) {
-    file_ = std::make_unique<TextFile>(path_);
+    file_ = std::make_unique<OutputFile>(path_);
     writeTumTrajectory(file_->stream(), {});  // the header
   }
   writeTumPose(file_->stream(), pose);
@@ -36,15 +36,15 @@ void PoseTextFile::close() {
 void writeCamchain(const std::filesystem::path& folder, const Rig& rig) {
   const auto has_lens = [](const RigCamera& camera) { return camera.model.fx > 0; };
   if (!std::all_of(rig.cameras.begin(), rig.cameras.end(), has_lens)) return;
-  TextFile camchain(folder / "camchain.yaml");
+  OutputFile camchain(folder / "camchain.yaml");
   camchain.stream() << formatCamchain(rig);
   camchain.close();
 }
 
-void TextFile::requireWritten() const {
+void OutputFile::requireWritten() const {
   if (stream_) return;
   const std::string why = reasonNotWritten(errno);
-  throw std::runtime_error(path_.string() + ": " + (why.empty() ? "cannot be written" : why));
+  throw std::runtime_error(name_.string() + ": " + (why.empty() ? "cannot be written" : why));
 }
 
 namespace {
@@ -74,7 +74,7 @@ class FolderWriter : public RecordingWriter {
     const std::filesystem::path depth = folder_.temporary() / "depth";
     if (!truth_) {
       std::filesystem::create_directory(depth);
-      truth_ = std::make_unique<TextFile>(depth / "index.txt");
+      truth_ = std::make_unique<OutputFile>(depth / "index.txt");
     }
     const std::string name = "cam0_" + formatSeconds(t_ns) + ".tiff";
     std::filesystem::copy_file(file, depth / name);
@@ -83,16 +83,16 @@ class FolderWriter : public RecordingWriter {
 
   void close() override {
     if (truth_) truth_->close();
-    for (TextFile& file : events_) file.close();
+    for (OutputFile& file : events_) file.close();
     poses_.close();
     folder_.finish();
   }
 
  private:
   NewFolder folder_;
-  std::vector<TextFile> events_;  // per camera
+  std::vector<OutputFile> events_;  // per camera
   PoseTextFile poses_;
-  std::unique_ptr<TextFile> truth_;  // the index, if there is any
+  std::unique_ptr<OutputFile> truth_;  // the index, if there is any
 };
 
 }  // namespace

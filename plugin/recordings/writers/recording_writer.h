@@ -16,10 +16,12 @@
 
 namespace efm {
 
-/// A text file to write.
-class TextFile {
+/// A file to write.
+class OutputFile {
  public:
-  explicit TextFile(std::filesystem::path path);
+  explicit OutputFile(std::filesystem::path path) : OutputFile(path, path) {}
+  /// @param name of the complete file, for errors.
+  OutputFile(const std::filesystem::path& path, std::filesystem::path name);
 
   std::ofstream& stream() { return stream_; }
   /// @throws std::runtime_error naming the file if it could not be written, and why if the last
@@ -29,7 +31,7 @@ class TextFile {
   void close();
 
  private:
-  std::filesystem::path path_;
+  std::filesystem::path name_;
   std::ofstream stream_;
 };
 
@@ -43,7 +45,7 @@ class PoseTextFile {
 
  private:
   std::filesystem::path path_;
-  std::unique_ptr<TextFile> file_;
+  std::unique_ptr<OutputFile> file_;
 };
 
 /// Writes camchain.yaml, if the cameras are calibrated.
