@@ -1,19 +1,287 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/results/pictures/curve_plot.h"
 
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 namespace efm {
 namespace {
 
+constexpr double kMargin = 0.04;
+
+std::string shortText(double value) { return fmt::format("{:.6g}", value); }
+
+/// The smallest of 1, 2, 5 times a power of ten that is `min_step` or more.
+double roundStep(double min_step) {
+  const double power = std::pow(10.0, std::floor(std::log10(min_step)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= min_step * (1 - 1e-9)) return factor * power;
+  }
+  return 10 * power;
+}
+
+std::vector<AxisTick> multiplesInside(const AxisRange& range, double step) {
+  const double slack = 1e-9 * step;
+  const double last = std::floor((range.to + slack) / step);
+  std::vector<AxisTick> ticks;
+  // The sum makes 0 of -0.
+  for (double k = std::ceil((range.from - slack) / step) + 0.0; k <= last; ++k) {
+    ticks.push_back({k * step, shortText(k * step)});
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> linearTicks(const AxisRange& range, int max_ticks) {
+  double step = roundStep((range.to - range.from) / (max_ticks + 1));
+  std::vector<AxisTick> ticks = multiplesInside(range, step);
+  while (ticks.size() > static_cast<std::size_t>(max_ticks)) {
+    step = roundStep(1.5 * step);
+    ticks = multiplesInside(range, step);
+  }
+  return ticks;
+}
+
+/// Powers of ten times each factor inside the range; every `stride`-th power.
+std::vector<AxisTick> powersInside(const AxisRange& range, const std::vector<double>& factors,
+                                   int stride) {
+  const int first = static_cast<int>(std::floor(std::log10(range.from)));
+  const int last = static_cast<int>(std::ceil(std::log10(range.to)));
+  std::vector<AxisTick> ticks;
+  for (int power = first; power <= last; power += stride) {
+    for (const double factor : factors) {
+      const double value = factor * std::pow(10.0, power);
+      if (value < range.from * (1 - 1e-9) || value > range.to * (1 + 1e-9)) continue;
+      ticks.push_back({value, shortText(value)});
+    }
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int max_ticks) {
+  const auto max_size = static_cast<std::size_t>(max_ticks);
+  std::vector<AxisTick> ticks = powersInside(range, {1, 2, 5}, 1);
+  // Over a short interval the axis is nearly linear.
+  if (ticks.size() < 3) return linearTicks(range, max_ticks);
+  if (ticks.size() <= max_size + 2) return ticks;
+  for (int stride = 1; (ticks = powersInside(range, {1}, stride)).size() > max_size; ++stride) {
+  }
+  return ticks;
+}
+
+/// The roundest values first, where their neighbours leave them space.
+std::vector<AxisTick> inverseTicks(const AxisRange& range, int max_ticks) {
+  static const std::vector<double> kRoundness[] = {{1}, {2, 5}, {1.5, 3}, {4, 7}, {1.2, 2.5, 6, 8}};
+  std::vector<AxisTick> ticks;
+  for (const std::vector<double>& factors : kRoundness) {
+    for (const AxisTick& tick : powersInside(range, factors, 1)) {
+      const double at = range.fractionAlong(tick.value);
+      const bool has_space = std::none_of(ticks.begin(), ticks.end(), [&](const AxisTick& other) {
+        return std::abs(range.fractionAlong(other.value) - at) * max_ticks < 1;
+      });
+      if (has_space) ticks.push_back(tick);
+    }
+  }
+  if (ticks.size() < 2) return linearTicks(range, max_ticks);
+  std::sort(ticks.begin(), ticks.end(),
+            [](const AxisTick& a, const AxisTick& b) { return a.value < b.value; });
+  return ticks;
+}
+
+}  // namespace
+
+double AxisRange::fractionAlong(double value) const {
+  if (scale == AxisScale::kLinear) return (value - from) / (to - from);
+  if (!(value > 0)) return std::numeric_limits<double>::quiet_NaN();
+  if (scale == AxisScale::kInverse) return (1 / value - 1 / from) / (1 / to - 1 / from);
+  return std::log(value / from) / std::log(to / from);
+}
+
+AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
+  const bool logarithmic = scale != AxisScale::kLinear;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value) || (logarithmic && !(value > 0))) continue;
+    const double position = logarithmic ? std::log10(value) : value;
+    low = std::min(low, position);
+    high = std::max(high, position);
+  }
+  if (low > high) low = high = 0;
+  double margin = kMargin * (high - low);
+  if (!(margin > 1e-12 * std::abs(high))) margin = std::max(0.1, 0.1 * std::abs(high));
+  low -= margin;
+  high += margin;
+  if (logarithmic) return {std::pow(10.0, low), std::pow(10.0, high), scale};
+  return {low, high, scale};
+}
+
+std::vector<AxisTick> ticksOf(const AxisRange& range, int max_ticks) {
+  if (!(range.from < range.to)) return {};
+  switch (range.scale) {
+    case AxisScale::kLogarithmic:
+      return logarithmicTicks(range, max_ticks);
+    case AxisScale::kInverse:
+      return inverseTicks(range, max_ticks);
+    case AxisScale::kLinear:
+      break;
+  }
+  return linearTicks(range, max_ticks);
+}
+
+namespace {
+
+constexpr int kPlotFont = cv::FONT_HERSHEY_SIMPLEX;
+
+/// Of the strokes of a text, in pixels.
+int thicknessOf(double scale) { return std::max(1, cvRound(1.7 * scale)); }
+
+}  // namespace
+
+cv::Size plotTextSize(const std::string& text, double scale) {
+  int baseline = 0;
+  const cv::Size size = cv::getTextSize(text, kPlotFont, scale, thicknessOf(scale), &baseline);
+  return {size.width, size.height + baseline};
+}
+
+void writeText(cv::Mat3b& picture, const std::string& text, cv::Point at, double scale) {
+  cv::putText(picture, text, at, kPlotFont, scale, kPlotInk, thicknessOf(scale), cv::LINE_AA);
+}
+
+namespace {
+
+constexpr int kPlotGap = 6;  // pixels between two parts
+constexpr double kPlotTitleScale = 0.5;
+const cv::Scalar kPlotGrid = cv::Scalar::all(225);
 constexpr int kLegendLine = 18;    // pixels
 constexpr int kLegendStroke = 24;  // pixels
-constexpr int kSubpixelBits = 4;
+
+/// The rectangle that curves are drawn in, and the values at its edges.
+struct PlotFrame {
+  cv::Rect area;  ///< Pixels of the picture.
+  AxisRange x;
+  AxisRange y;
+
+  /// The pixel of a point in the picture. NaN for a value that a logarithmic axis cannot show.
+  cv::Point2d pixelOf(const cv::Point2d& point) const {
+    return {area.x + x.fractionAlong(point.x) * (area.width - 1),
+            area.br().y - 1 - y.fractionAlong(point.y) * (area.height - 1)};
+  }
+};
+
+AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool is_x) {
+  std::vector<double> values;
+  for (const Curve& curve : plot.curves) {
+    for (const cv::Point2d& point : curve.points) values.push_back(is_x ? point.x : point.y);
+  }
+  // The range includes a given end, so that the margin at the other end is right.
+  for (const auto& end : {axis.from, axis.to}) {
+    if (end) values.push_back(*end);
+  }
+  AxisRange range = rangeAround(values, axis.scale);
+  if (axis.from) range.from = *axis.from;
+  if (axis.to) range.to = *axis.to;
+  const bool fits = std::isfinite(range.from) && std::isfinite(range.to) && range.from < range.to &&
+                    (axis.scale == AxisScale::kLinear || range.from > 0);
+  if (!fits) {
+    throw std::invalid_argument("the plot '" + plot.title + "': the axis '" + axis.label +
+                                "' from " + std::to_string(range.from) + " to " +
+                                std::to_string(range.to) +
+                                ": expected ends in this order, above 0 where it is logarithmic");
+  }
+  return range;
+}
+
+/// Widens the range with more pixels per unit.
+void makeUnitsEqual(AxisRange& x, AxisRange& y, cv::Size pixels) {
+  const double per_pixel =
+      std::max((x.to - x.from) / pixels.width, (y.to - y.from) / pixels.height);
+  const auto widen = [&](AxisRange& range, int length) {
+    const double middle = 0.5 * (range.from + range.to);
+    range.from = middle - 0.5 * per_pixel * length;
+    range.to = middle + 0.5 * per_pixel * length;
+  };
+  widen(x, pixels.width);
+  widen(y, pixels.height);
+}
+
+int maxTicksX(const cv::Rect& area) { return std::max(2, area.width / 55); }
+int maxTicksY(const cv::Rect& area) { return std::max(2, area.height / 36); }
+
+/// Writes a text rotated to the left, around its centre.
+void writeTextUpwards(cv::Mat3b& picture, const std::string& text, cv::Point centre) {
+  const cv::Size size = plotTextSize(text) + cv::Size(2, 2);
+  cv::Mat3b horizontal(size, cv::Vec3b(255, 255, 255));
+  writeText(horizontal, text, {0, size.height - 6});
+  cv::Mat3b upright;
+  cv::rotate(horizontal, upright, cv::ROTATE_90_COUNTERCLOCKWISE);
+  const cv::Rect target(centre - cv::Point(upright.cols / 2, upright.rows / 2), upright.size());
+  const cv::Rect visible = target & cv::Rect({}, picture.size());
+  upright(visible - target.tl()).copyTo(picture(visible));
+}
+
+/// Computes the frame of a plot: the picture without its labels; the ends of the axes fit the
+/// curves.
+PlotFrame layOut(const CurvePlot& plot) {
+  PlotFrame frame;
+  frame.x = rangeOf(plot, plot.x, true);
+  frame.y = rangeOf(plot, plot.y, false);
+  const int line = plotTextSize("0").height;
+  const auto area_with = [&](int tick_width) {
+    const int left =
+        2 * kPlotGap + (plot.y.label.empty() ? 0 : line + kPlotGap) + tick_width + kPlotGap;
+    const int top = plot.title.empty() ? 2 * kPlotGap : line + 3 * kPlotGap;
+    const int bottom = 2 * kPlotGap + line + (plot.x.label.empty() ? 0 : line + kPlotGap);
+    return cv::Rect(left, top, plot.size.width - left - 3 * kPlotGap,
+                    plot.size.height - top - bottom);
+  };
+  frame.area = area_with(0);
+  if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
+  int tick_width = 0;
+  for (const AxisTick& tick : ticksOf(frame.y, maxTicksY(frame.area))) {
+    tick_width = std::max(tick_width, plotTextSize(tick.text).width);
+  }
+  frame.area = area_with(tick_width);
+  if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
+  return frame;
+}
+
+/// Draws grid, axes, ticks, labels and title.
+void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame) {
+  const cv::Rect& area = frame.area;
+  const int bottom = area.br().y - 1;
+  const int right = area.br().x - 1;
+  for (const AxisTick& tick : ticksOf(frame.x, maxTicksX(area))) {
+    const int x = cvRound(frame.pixelOf({tick.value, frame.y.from}).x);
+    cv::line(picture, {x, area.y}, {x, bottom}, kPlotGrid);
+    cv::line(picture, {x, bottom}, {x, bottom + 3}, kPlotInk);
+    const cv::Size size = plotTextSize(tick.text);
+    writeText(picture, tick.text, {x - size.width / 2, bottom + kPlotGap + size.height - 3});
+  }
+  for (const AxisTick& tick : ticksOf(frame.y, maxTicksY(area))) {
+    const int y = cvRound(frame.pixelOf({frame.x.from, tick.value}).y);
+    cv::line(picture, {area.x, y}, {right, y}, kPlotGrid);
+    cv::line(picture, {area.x - 3, y}, {area.x, y}, kPlotInk);
+    writeText(picture, tick.text, {area.x - kPlotGap - plotTextSize(tick.text).width, y + 4});
+  }
+  cv::rectangle(picture, area, kPlotInk);
+
+  const int middle = area.x + area.width / 2;
+  writeText(picture, plot.x.label,
+            {middle - plotTextSize(plot.x.label).width / 2, picture.rows - 2 * kPlotGap + 2});
+  if (!plot.y.label.empty()) {
+    writeTextUpwards(picture, plot.y.label, {2 * kPlotGap, area.y + area.height / 2});
+  }
+  writeText(picture, plot.title,
+            {std::max(kPlotGap, middle - plotTextSize(plot.title, kPlotTitleScale).width / 2),
+             area.y - kPlotGap - 2},
+            kPlotTitleScale);
+}
 
 /// Not NaN, and within the range of cv::line.
 bool canBeDrawn(const cv::Point2d& pixel) {
@@ -33,11 +301,6 @@ std::vector<std::vector<cv::Point2d>> linesOf(const Curve& curve, const PlotFram
     }
   }
   return lines;
-}
-
-cv::Point subpixel(const cv::Point2d& pixel) {
-  constexpr double kOnes = 1 << kSubpixelBits;
-  return {cvRound(pixel.x * kOnes), cvRound(pixel.y * kOnes)};
 }
 
 /// @param picture the area of the frame: OpenCV cuts the curve at its edges.

@@ -29,9 +29,7 @@ struct AxisRange {
 
 /// The range of all values that an axis of this scale can show, with a margin of 4 % of its length
 /// at both ends (of its logarithm unless it is linear). Without a value: a range around 0, or
-/// around
-/// 1. With one
-/// value: a range around it.
+/// around 1. With one value: a range around it.
 AxisRange rangeAround(const std::vector<double>& values, AxisScale scale);
 
 /// A mark on an axis.
@@ -88,33 +86,10 @@ cv::Mat3b drawCurves(const CurvePlot& plot);
 /// and Ito 2008), then the same again.
 cv::Vec3b curveColour(std::size_t index);
 
-/// The rectangle that curves are drawn in, and the values at its edges.
-struct PlotFrame {
-  cv::Rect area;  ///< Pixels of the picture.
-  AxisRange x;
-  AxisRange y;
+// What all parts of a picture share. Text is ASCII.
 
-  /// The pixel of a point in the picture. NaN for a value that a logarithmic axis cannot show.
-  cv::Point2d pixelOf(const cv::Point2d& point) const {
-    return {area.x + x.fractionAlong(point.x) * (area.width - 1),
-            area.br().y - 1 - y.fractionAlong(point.y) * (area.height - 1)};
-  }
-};
-
-/// Computes the frame of a plot: the picture without its labels; the ends of the axes fit the
-/// curves.
-PlotFrame layOut(const CurvePlot& plot);
-
-/// Draws grid, axes, ticks, labels and title.
-void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame);
-
-// What all parts of a plot share. Text is ASCII.
-
-inline constexpr int kPlotGap = 6;  ///< Pixels between two parts.
 inline constexpr double kPlotTextScale = 0.42;
-inline constexpr double kPlotTitleScale = 0.5;
-inline const cv::Scalar kPlotInk = cv::Scalar::all(40);    ///< Text and axes.
-inline const cv::Scalar kPlotGrid = cv::Scalar::all(225);  ///< Grid lines.
+inline const cv::Scalar kPlotInk = cv::Scalar::all(40);  ///< Text and axes.
 
 /// Width and height of a text in pixels, with the parts of letters below the line.
 cv::Size plotTextSize(const std::string& text, double scale = kPlotTextScale);
@@ -122,5 +97,12 @@ cv::Size plotTextSize(const std::string& text, double scale = kPlotTextScale);
 /// @param at the lower left corner of the text.
 void writeText(cv::Mat3b& picture, const std::string& text, cv::Point at,
                double scale = kPlotTextScale);
+
+/// A position for OpenCV's functions with `kSubpixelBits` as shift.
+inline constexpr int kSubpixelBits = 4;
+inline cv::Point subpixel(const cv::Point2d& pixel) {
+  constexpr double kOnes = 1 << kSubpixelBits;
+  return {cvRound(pixel.x * kOnes), cvRound(pixel.y * kOnes)};
+}
 
 }  // namespace efm

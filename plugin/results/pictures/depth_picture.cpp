@@ -166,27 +166,21 @@ cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width) {
 }
 
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
-  ValuePicture figure;
-  figure.values = map.depth;
-  figure.range = depthAxis(limits);
-  figure.unit = "m";
-  figure.palette = Palette::kBrightToDark;
-  figure.min_width = kMinFigureWidth;
-  figure.under = lightGrey(map.confidence);
-  return drawValues(figure);
+  return drawValues({"", map.depth, depthAxis(limits), "m", Palette::kBrightToDark, kMinFigureWidth,
+                     lightGrey(map.confidence)});
 }
 
 cv::Mat1b confidenceFigure(const cv::Mat1f& confidence) {
   const double maximum = maximumOf(confidence);
-  ValuePicture figure;
-  figure.values = confidence;
-  figure.range = {0, maximum > 0 ? maximum : 1};
-  figure.unit = "confidence";
-  figure.palette = Palette::kWhiteToBlack;
-  figure.min_width = kMinFigureWidth;
   // Nothing in it has a colour, and one channel is encoded faster than three.
   cv::Mat1b grey;
-  cv::extractChannel(drawValues(figure), grey, 0);
+  cv::extractChannel(drawValues({"",
+                                 confidence,
+                                 {0, maximum > 0 ? maximum : 1},
+                                 "confidence",
+                                 Palette::kWhiteToBlack,
+                                 kMinFigureWidth}),
+                     grey, 0);
   return grey;
 }
 

@@ -227,7 +227,6 @@ namespace {
 constexpr double kLabelScale = 0.55;
 constexpr Palette kHeightPalette = Palette::kRainbow;
 const cv::Scalar kMapGrey = cv::Scalar::all(210);
-constexpr int kPathSubpixelBits = 4;
 
 /// Adds a weight of 1 around a position, to the four nearest pixels.
 class Splats {
@@ -307,29 +306,36 @@ void drawPoints(cv::Mat3b& picture, const MapView& view, const MapCloud& cloud,
   splats.picture(sigma).copyTo(picture(view.area));
 }
 
+/// Draws a path with a dot at its start and a ring at its end.
+/// @param pixels see `subpixel`.
+/// @param covers whether the path covers points, which need white around it.
+void drawPath(cv::Mat3b& picture, const std::vector<cv::Point>& pixels, bool covers) {
+  const cv::Scalar white = cv::Scalar::all(255);
+  const auto line = [&](int width, const cv::Scalar& colour) {
+    cv::polylines(picture, pixels, false, colour, width, cv::LINE_AA, kSubpixelBits);
+  };
+  const auto dot = [&](const cv::Point& at, int radius, const cv::Scalar& colour) {
+    cv::circle(picture, at, radius << kSubpixelBits, colour, cv::FILLED, cv::LINE_AA,
+               kSubpixelBits);
+  };
+  if (covers) line(6, white);
+  line(2, kPlotInk);
+  for (const cv::Point& end : {pixels.front(), pixels.back()}) {
+    if (covers) dot(end, 8, white);
+    dot(end, 6, kPlotInk);
+  }
+  dot(pixels.back(), 4, white);
+}
+
 void drawTrajectory(cv::Mat3b& picture, const MapView& view,
                     const std::vector<StampedPose>& trajectory) {
   cv::Mat3b area = picture(view.area);
   const cv::Point2d corner = view.area.tl();
   std::vector<cv::Point> pixels;
   for (const StampedPose& pose : trajectory) {
-    const cv::Point2d pixel = view.pixelOf(pose.T_world_rig.translation) - corner;
-    constexpr double kOnes = 1 << kPathSubpixelBits;
-    pixels.emplace_back(cvRound(pixel.x * kOnes), cvRound(pixel.y * kOnes));
+    pixels.push_back(subpixel(view.pixelOf(pose.T_world_rig.translation) - corner));
   }
-  if (pixels.empty()) return;
-  const cv::Scalar white = cv::Scalar::all(255);
-  cv::polylines(area, pixels, false, white, 6, cv::LINE_AA, kPathSubpixelBits);
-  cv::polylines(area, pixels, false, kPlotInk, 2, cv::LINE_AA, kPathSubpixelBits);
-  const auto dot = [&](const cv::Point& at, int radius, const cv::Scalar& colour) {
-    cv::circle(area, at, radius << kPathSubpixelBits, colour, cv::FILLED, cv::LINE_AA,
-               kPathSubpixelBits);
-  };
-  dot(pixels.front(), 8, white);
-  dot(pixels.front(), 6, kPlotInk);
-  dot(pixels.back(), 8, white);
-  dot(pixels.back(), 6, kPlotInk);
-  dot(pixels.back(), 4, white);
+  if (!pixels.empty()) drawPath(area, pixels, true);
 }
 
 /// 1, 2 or 5 times a power of ten.
@@ -349,10 +355,7 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
   cv::rectangle(picture, cv::Rect(area.x, area.y + 14, length, 6), kPlotInk, cv::FILLED);
   writeText(picture, fmt::format("{:g} m", length_m), {area.x, area.br().y - 10}, kLabelScale);
   const cv::Point sample(area.x + 290, area.y + 17);
-  cv::line(picture, sample, sample + cv::Point(60, 0), kPlotInk, 2, cv::LINE_AA);
-  cv::circle(picture, sample, 6, kPlotInk, cv::FILLED, cv::LINE_AA);
-  cv::circle(picture, sample + cv::Point(60, 0), 6, kPlotInk, cv::FILLED, cv::LINE_AA);
-  cv::circle(picture, sample + cv::Point(60, 0), 4, cv::Scalar::all(255), cv::FILLED, cv::LINE_AA);
+  drawPath(picture, {subpixel(sample), subpixel(sample + cv::Point(60, 0))}, false);
   writeText(picture, "start to end", {sample.x - 6, area.br().y - 10}, kLabelScale);
   if (!has_points) return;
   const int width = std::min(600, area.width - 460);

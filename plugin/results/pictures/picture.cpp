@@ -32,39 +32,29 @@ namespace {
 const cv::Scalar kWhite = cv::Scalar::all(255);
 constexpr int kGap = 8;  // pixels between two pictures
 
-cv::Size largestSize(const std::vector<cv::Mat3b>& pictures) {
-  cv::Size size;
+cv::Mat3b joined(const std::vector<cv::Mat3b>& pictures, bool beside) {
+  cv::Size largest;
   for (const cv::Mat3b& picture : pictures) {
-    size = {std::max(size.width, picture.cols), std::max(size.height, picture.rows)};
+    largest = {std::max(largest.width, picture.cols), std::max(largest.height, picture.rows)};
   }
-  return size;
+  std::vector<cv::Mat3b> padded(pictures.size());
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const cv::Size missing = largest - pictures[i].size();
+    const int gap = i > 0 ? kGap : 0;
+    const int left = beside ? gap : missing.width / 2;
+    cv::copyMakeBorder(pictures[i], padded[i], beside ? 0 : gap, beside ? missing.height : 0, left,
+                       beside ? 0 : missing.width - left, cv::BORDER_CONSTANT, kWhite);
+  }
+  cv::Mat3b whole;
+  beside ? cv::hconcat(padded, whole) : cv::vconcat(padded, whole);
+  return whole;
 }
 
 }  // namespace
 
-cv::Mat3b sideBySide(const std::vector<cv::Mat3b>& pictures) {
-  const int height = largestSize(pictures).height;
-  std::vector<cv::Mat3b> padded(pictures.size());
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    cv::copyMakeBorder(pictures[i], padded[i], 0, height - pictures[i].rows, i > 0 ? kGap : 0, 0,
-                       cv::BORDER_CONSTANT, kWhite);
-  }
-  cv::Mat3b joined;
-  cv::hconcat(padded, joined);
-  return joined;
-}
-
+cv::Mat3b sideBySide(const std::vector<cv::Mat3b>& pictures) { return joined(pictures, true); }
 cv::Mat3b oneBelowAnother(const std::vector<cv::Mat3b>& pictures) {
-  const int width = largestSize(pictures).width;
-  std::vector<cv::Mat3b> padded(pictures.size());
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const int left = (width - pictures[i].cols) / 2;
-    cv::copyMakeBorder(pictures[i], padded[i], i > 0 ? kGap : 0, 0, left,
-                       width - pictures[i].cols - left, cv::BORDER_CONSTANT, kWhite);
-  }
-  cv::Mat3b joined;
-  cv::vconcat(padded, joined);
-  return joined;
+  return joined(pictures, false);
 }
 
 namespace {

@@ -21,7 +21,7 @@ namespace efm {
 
 /// RFC 4648, with padding. Parts of a longer content can be joined where all but the last have a
 /// multiple of 3 bytes.
-std::string base64(const std::vector<std::uint8_t>& bytes);
+std::string base64(std::string_view bytes);
 
 /// The page without data: `page/page.html` with its style and scripts inside. Made by
 /// `embed_page.cmake`.
@@ -37,7 +37,7 @@ struct PagePoint {
   std::uint8_t support = 0;     ///< Number of keyframes, at most 255.
   std::uint16_t keyframe = 0;   ///< The first one, divided by `keyframe_step`, rounded down.
 
-  void appendTo(std::vector<std::uint8_t>& bytes) const;
+  void appendTo(std::string& bytes) const;
 };
 
 /// The points of a map as the page has them: quantised, at most `limit` of them. Where the map has
@@ -89,8 +89,8 @@ class PagePoints {
 
 /// Small pictures of a keyframe, PNG files of the same size.
 struct KeyframePicture {
-  std::vector<std::uint8_t> depth;
-  std::vector<std::uint8_t> events;  ///< Empty where none are known.
+  std::string depth;
+  std::string events;  ///< Empty where none are known.
 
   std::size_t bytes() const { return depth.size() + events.size(); }
 };

@@ -7,11 +7,11 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <set>
 #include <sstream>
 
+#include "mapping/base/picture_file.h"
 #include "plugin/results/pictures/depth_picture.h"
 
 namespace efm {
@@ -38,8 +38,8 @@ std::vector<CloudPoint> randomPoints(int count, const Eigen::Vector3d& origin_m)
 TEST(Base64, IsThatOfTheStandard) {
   const std::pair<std::string, std::string> cases[] = {
       {"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foobar", "Zm9vYmFy"}};
-  for (const auto& [bytes, text] : cases) EXPECT_EQ(base64({bytes.begin(), bytes.end()}), text);
-  EXPECT_EQ(base64({0xFB, 0xFF, 0xBF}), "+/+/");
+  for (const auto& [bytes, text] : cases) EXPECT_EQ(base64(bytes), text);
+  EXPECT_EQ(base64("\xFB\xFF\xBF"), "+/+/");
 }
 
 /// Far from the origin of the world, as in a town's coordinates.
@@ -133,7 +133,7 @@ TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
     const MapCloud::ConstPtr two = mapCloudOf({{{0, 0, 0}, 1, 1, 0}, {{1, 0, 0}, 1, 1, last}}, 1);
     EXPECT_EQ(PagePoints(*two, 0.01).keyframeStep(), last == 65'536 ? 2U : 1U);
   }
-  std::vector<std::uint8_t> bytes;
+  std::string bytes;
   PagePoint{{0x0102, 3, 0x0405}, 6, 7, 0x0809}.appendTo(bytes);
   EXPECT_THAT(bytes, testing::ElementsAre(2, 1, 3, 0, 5, 4, 6, 7, 9, 8));
 }
@@ -170,9 +170,7 @@ TEST(KeyframePictures, JoinBlocksOfPixelsToTheNearestDepthAndTheSumOfEvents) {
   KeyframePictures pictures(limits);
   pictures.add(depth, events);
   pictures.add(depth, {});
-  const auto decoded = [](const std::vector<std::uint8_t>& png) {
-    return cv::Mat3b(cv::imdecode(png, cv::IMREAD_COLOR));
-  };
+  const auto decoded = [](const std::string& png) { return cv::Mat3b(decodePicture(png)); };
   const cv::Vec3b white(255, 255, 255);
   const cv::Mat3b depth_picture = decoded(pictures.pictures().at(0).depth);
   const cv::Mat3b event_picture = decoded(pictures.pictures().at(0).events);
@@ -249,7 +247,7 @@ TEST(MapPage, SaysHowManyPointsAreLeftOut) {
     EXPECT_EQ(shown.size() == 15'000, limit == 15'000) << "as many as there may be";
     EXPECT_EQ(map["thinned_m"], shown.thinned_m());
     EXPECT_FALSE(map.contains("view"));
-    std::vector<std::uint8_t> bytes;
+    std::string bytes;
     for (std::size_t i = 0; i < shown.size(); ++i) shown.at(i).appendTo(bytes);
     EXPECT_EQ(dataOf(stream.str(), "point-data"), base64(bytes));
   }
