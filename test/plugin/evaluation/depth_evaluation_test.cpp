@@ -12,6 +12,7 @@
 namespace efm {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 class EvaluateDepth : public TemporaryFolder {
@@ -29,43 +30,36 @@ class EvaluateDepth : public TemporaryFolder {
 };
 
 TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
-  tiff("out/keyframes/1.000000000/depth.tiff", 2);
-  tiff("out/keyframes/2.000000000/depth.tiff", 2);
-  tiff("out/keyframes/3.000000000/depth.tiff", 2);
+  for (const char* name : {"1.000000000", "2.000000000", "3.000000000"}) {
+    tiff("out/keyframes/" + std::string(name) + "/depth.tiff", 2);
+  }
+  tiff("out/keyframes/4.000000000/depth.tiff", 0);  // no points: not part of the mean
   tiff("data/depth/cam0_a.tiff", 3);
   tiff("data/depth/cam0_b.tiff", 4);
   std::ofstream(folder() / "data/depth/index.txt")
-      << "# t file\n2.0005 cam0_b.tiff\n0.9995 cam0_a.tiff\n3.002 cam0_a.tiff\n";
+      << "# t file\n2.0005 cam0_b.tiff\n0.9995 cam0_a.tiff\n3.002 cam0_a.tiff\n4 cam0_a.tiff\n";
+  DepthEvaluationOptions options;
+  options.thresholds_m = {0.25, 1};
+  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", options);
 
-  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", {});
-
-  ASSERT_EQ(evaluation.maps.size(), 2U);
+  ASSERT_EQ(evaluation.maps.size(), 3U);
   EXPECT_EQ(evaluation.maps[0].name, "1.000000000");
   EXPECT_EQ(evaluation.maps[0].errors.mean_abs_m, 1);
   EXPECT_EQ(evaluation.maps[1].errors.mean_abs_m, 2);
   EXPECT_EQ(evaluation.mean.median_abs_m, 1.5);
   EXPECT_EQ(evaluation.all.points, 24U);
-  EXPECT_EQ(evaluation.without_truth, 1U);
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 depth maps have no truth within 1 ms"));
-  const auto json = nlohmann::json::parse(evaluationJson(evaluation));
-  EXPECT_EQ(json["maps"].size(), 2U);
-  EXPECT_EQ(json["mean"]["mean_abs_m"], 1.5);
-}
-
-TEST_F(EvaluateDepth, PrecisionAndRecallAreOverAllPixelsOfAllMaps) {
-  tiff("out/1/depth.tiff", 2);
-  tiff("out/2/depth.tiff", 3);
-  tiff("data/a.tiff", 2.5);
-  std::ofstream(folder() / "data/index.txt") << "1 a.tiff\n2 a.tiff\n3 a.tiff\n";
-  DepthEvaluationOptions options;
-  options.thresholds_m = {0.25, 0.5};
-  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", options);
-  EXPECT_EQ(evaluation.detection.truths, 24U);
+  EXPECT_EQ(evaluation.detection.truths, 36U) << "over all pixels of all maps";
   EXPECT_EQ(evaluation.detection.precision(0), 0);
-  EXPECT_EQ(evaluation.detection.f1(1), 1);
-  EXPECT_EQ(evaluation.without_estimate, 1U);
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 true maps have no estimate"));
-  EXPECT_EQ(nlohmann::json::parse(evaluationJson(evaluation))["curve"][1]["recall"], 1);
+  EXPECT_EQ(evaluation.detection.precision(1), 0.5);
+  EXPECT_THAT(evaluationTable(evaluation),
+              AllOf(HasSubstr("1 depth maps have no truth within 1 ms"), HasSubstr("  -"),
+                    HasSubstr("1 true maps have no estimate")));
+  const std::string text = evaluationJson(evaluation);
+  EXPECT_THAT(text, HasSubstr("\"points\": 0,\n      \"name\""));
+  const auto json = nlohmann::json::parse(text);
+  EXPECT_EQ(json["maps"].size(), 3U);
+  EXPECT_EQ(json["mean"]["mean_abs_m"], 1.5);
+  EXPECT_EQ(json["curve"][1]["recall"], 12.0 / 36);
 }
 
 TEST_F(EvaluateDepth, AMaskAndAScaleApplyToAllMaps) {
@@ -141,22 +135,11 @@ bad-pix with focal length 400.00 px and baseline 0.1000 m
 )");
 }
 
-TEST_F(EvaluateDepth, AMapWithoutPointsIsNotPartOfTheMean) {
-  tiff("out/keyframes/1.000000000/depth.tiff", 2);
-  tiff("out/keyframes/2.000000000/depth.tiff", 0);
-  tiff("data/depth/a.tiff", 3);
-  std::ofstream(folder() / "data/depth/index.txt") << "1 a.tiff\n2 a.tiff\n";
-  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", {});
-  EXPECT_EQ(evaluation.mean.mean_abs_m, 1) << "of the one that has points";
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("  -"));
-  EXPECT_THAT(evaluationJson(evaluation), HasSubstr("\"points\": 0,\n      \"name\""));
-  EXPECT_THAT(errorOf(tiff("none.tiff", 0), tiff("b.tiff", 3)), HasSubstr("no pixel"));
-}
-
 TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   const auto a = tiff("a.tiff", 2);
   EXPECT_THAT(errorOf(folder() / "nowhere.tiff", a), HasSubstr("nowhere.tiff"));
   EXPECT_THAT(errorOf(folder(), a), HasSubstr("two files or two folders"));
+  EXPECT_THAT(errorOf(tiff("none.tif", 0), a), HasSubstr("no pixel"));
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("no depth maps in"));
   EXPECT_THAT(errorOf(a, tiff("wide.tiff", 2, {8, 3})), HasSubstr("wide.tiff"));
   std::ofstream(folder() / "index.txt") << "1.0 a.tiff\n";
@@ -172,82 +155,66 @@ TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("within 1 ms"));
 }
 
-class FindStereoBaseline : public TemporaryFolder {
+/// Writes and finds the texts of a folder.
+class TextFolder : public TemporaryFolder {
  protected:
   void write(const std::string& file, const std::string& text = "") const {
-    std::filesystem::create_directories((folder() / file).parent_path());
-    std::ofstream(folder() / file) << text;
-  }
-  void writeReport(const std::string& text) const { write("out/report.json", text); }
-  void writeCamchain(bool stereo) const {
-    const std::string camera =
-        "  camera_model: pinhole\n  intrinsics: [300, 301, 50, 40]\n  distortion_model: none\n"
-        "  resolution: [100, 80]\n";
-    write("data/camchain.yaml",
-          "cam0:\n" + camera +
-              (stereo ? "cam1:\n" + camera +
-                            "  T_cn_cnm1: [[1, 0, 0, -0.3], [0, 1, 0, 0], [0, 0, 1, 0.4], "
-                            "[0, 0, 0, 1]]\n"
-                      : ""));
-  }
-  std::optional<StereoBaseline> find(const std::string& estimate, const std::string& truth) const {
-    return findStereoBaseline(folder() / estimate, folder() / truth);
+    writeFile(folder() / file, text);
   }
 };
 
-TEST_F(FindStereoBaseline, TheRunsReportComesFirst) {
-  writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
-  writeCamchain(true);
+using FindStereoBaseline = TextFolder;
+
+TEST_F(FindStereoBaseline, IsInTheRunsReportOrElseInTheDatasetsCalibration) {
+  const std::string camera =
+      "  camera_model: pinhole\n  intrinsics: [300, 301, 50, 40]\n  distortion_model: none\n"
+      "  resolution: [100, 80]\n";
+  const std::string one = "cam0:\n" + camera;
+  const std::string two =
+      one + "cam1:\n" + camera +
+      "  T_cn_cnm1: [[1, 0, 0, -0.3], [0, 1, 0, 0], [0, 0, 1, 0.4], [0, 0, 0, 1]]\n";
+  const std::string full = R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})";
   write("out/keyframes/1.5/depth.tiff");
-  for (const char* estimate : {"out", "out/keyframes", "out/keyframes/1.5/depth.tiff"}) {
-    const auto base = find(estimate, "data");
-    ASSERT_TRUE(base) << estimate;
-    EXPECT_EQ(base->focal_px, 200.5);
-    EXPECT_NEAR(base->focalBaseline(), 20.05, 1e-12);
-    EXPECT_THAT(base->source, HasSubstr("report.json"));
-  }
-}
-
-TEST_F(FindStereoBaseline, TheDatasetsCalibrationIsTheSecond) {
-  writeCamchain(true);
   write("data/depth/a.tiff");
-  // Reports that say nothing of it.
-  for (const char* report : {"{}", "[1]", "{", R"({"reference_view": 3, "baseline_m": 1})",
-                             R"({"reference_view": {"fx": 200}})",
-                             R"({"reference_view": {"fx": 200}, "baseline_m": 0})"}) {
-    writeReport(report);
-    for (const char* truth : {"data", "data/depth", "data/depth/a.tiff"}) {
-      const auto base = find("out", truth);
-      ASSERT_TRUE(base) << truth << " " << report;
-      EXPECT_EQ(base->focal_px, 300);
-      EXPECT_NEAR(base->baseline_m, 0.5, 1e-12);
+  struct Case {
+    std::string report, camchain;  // empty: none
+    const char *estimate, *truth;
+    double focal_px, baseline_m;  // 0: not found
+  };
+  for (const Case& each : std::vector<Case>{
+           {full, two, "out", "data", 200.5, 0.1},
+           {full, two, "out/keyframes/1.5/depth.tiff", "data", 200.5, 0.1},
+           {full, one, "out/a/b/c/d", "data", 0, 0},  // higher than a run has folders
+           {"{}", two, "out", "data", 300, 0.5},
+           {"[1]", two, "out", "data/depth", 300, 0.5},
+           {"{", two, "out", "data/depth/a.tiff", 300, 0.5},
+           {R"({"reference_view": 3, "baseline_m": 1})", two, "out", "data", 300, 0.5},
+           {R"({"reference_view": {"fx": 200}})", two, "out", "data", 300, 0.5},
+           {R"({"reference_view": {"fx": 200}, "baseline_m": 0})", two, "out", "data", 300, 0.5},
+           {"", two, "out", "data/a/b", 300, 0.5},
+           {"", two, "out", "data/a/b/c", 0, 0},
+           {"", one, "out", "data", 0, 0},
+           {"", "", "out", "data", 0, 0}}) {
+    for (const auto& [name, text] :
+         {std::pair{"out/report.json", each.report}, {"data/camchain.yaml", each.camchain}}) {
+      std::filesystem::remove(folder() / name);
+      if (!text.empty()) write(name, text);
     }
+    const auto found = findStereoBaseline(folder() / each.estimate, folder() / each.truth)
+                           .value_or(StereoBaseline());
+    EXPECT_EQ(found.focal_px, each.focal_px) << each.report << each.estimate << each.truth;
+    EXPECT_NEAR(found.baseline_m, each.baseline_m, 1e-12);
+    EXPECT_NEAR(found.focalBaseline(), each.focal_px * each.baseline_m, 1e-9);
+    EXPECT_THAT(found.source, HasSubstr(each.focal_px == 0     ? ""
+                                        : each.focal_px == 300 ? "camchain.yaml"
+                                                               : "report.json"));
   }
-}
-
-TEST_F(FindStereoBaseline, OneCameraHasNoBaseline) {
-  EXPECT_FALSE(find("out", "data"));
-  writeCamchain(false);
-  EXPECT_FALSE(find("out", "data"));
-}
-
-TEST_F(FindStereoBaseline, IsNotSearchedHigherThanARunHasFolders) {
-  writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
-  EXPECT_TRUE(find("out/a/b/c", "data"));
-  EXPECT_FALSE(find("out/a/b/c/d", "data"));
-  writeCamchain(true);
-  EXPECT_TRUE(find("none", "data/a/b"));
-  EXPECT_FALSE(find("none", "data/a/b/c"));
 }
 
 using testing::ElementsAre;
 
-class DepthSeries : public TemporaryFolder {
+class DepthSeries : public TextFolder {
  protected:
-  void write(const std::string& file, const std::string& text = "") const {
-    std::filesystem::create_directories((folder() / file).parent_path());
-    std::ofstream(folder() / file) << text;
-  }
   /// The files of a series, as paths inside the test's folder.
   std::vector<std::string> filesOf(const std::string& name, DepthSeriesRole role) const {
     std::vector<std::string> files;
@@ -267,20 +234,13 @@ TEST_F(DepthSeries, AFolderWithBothKindsReturnsTheMapsOfTheRole) {
   write("both/keyframes/notes/depth.tiff");
   write("both/keyframes/11.5/confidence.tiff");
   write("both/depth/index.txt", "# t file\n2 b.tiff\n1 a.tiff # the first\n\n");
-  EXPECT_THAT(filesOf("both", DepthSeriesRole::kEstimate),
-              ElementsAre("both/keyframes/9.5/depth.tiff", "both/keyframes/10.5/depth.tiff"));
-  EXPECT_THAT(filesOf("both", DepthSeriesRole::kTruth),
-              ElementsAre("both/depth/a.tiff", "both/depth/b.tiff"));
-}
-
-TEST_F(DepthSeries, EachRoleReadsTheOnlyKindOfAFolder) {
-  write("map/keyframes/1/depth.tiff");
-  write("data/depth/index.txt", "1 a.tiff\n");
-  EXPECT_THAT(filesOf("map", DepthSeriesRole::kTruth), ElementsAre("map/keyframes/1/depth.tiff"));
-  EXPECT_THAT(filesOf("map/keyframes", DepthSeriesRole::kTruth),
-              ElementsAre("map/keyframes/1/depth.tiff"));
-  EXPECT_THAT(filesOf("data", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
-  EXPECT_THAT(filesOf("data/depth", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
+  const auto maps = ElementsAre("both/keyframes/9.5/depth.tiff", "both/keyframes/10.5/depth.tiff");
+  const auto listed = ElementsAre("both/depth/a.tiff", "both/depth/b.tiff");
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kEstimate), maps);
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kTruth), listed);
+  // A folder with one kind has it for both roles.
+  EXPECT_THAT(filesOf("both/keyframes", DepthSeriesRole::kTruth), maps);
+  EXPECT_THAT(filesOf("both/depth", DepthSeriesRole::kEstimate), listed);
 }
 
 TEST_F(DepthSeries, ReadsTheTimeFromTheNameWithoutAnIndex) {
