@@ -80,31 +80,28 @@ ChunkCompression chunkCompression(std::string_view name,
   return ChunkCompression::kNone;
 }
 
-const std::uint8_t* unpackChunk(ChunkCompression compression, PackedChunk chunk,
-                                std::uint64_t claimed, std::unique_ptr<std::uint8_t[]>& owner) {
+ChunkBytes unpackChunk(ChunkCompression compression, ChunkBytes packed, std::uint64_t claimed) {
   if (claimed > kMaxChunkBytes) {
     throw std::runtime_error(fmt::format("a chunk of {} bytes: expected at most 1 GiB", claimed));
   }
-  const std::uint8_t* result = chunk.data;
-  std::size_t size = chunk.size;
-  if (compression == ChunkCompression::kNone) {
-    owner = std::move(chunk.file);
-  } else {
+  ChunkBytes bytes = std::move(packed);
+  if (compression != ChunkCompression::kNone) {
     // Without initial values: pages that nothing is written to take no memory.
-    owner.reset(new std::uint8_t[std::max<std::uint64_t>(claimed, 1)]);
-    result = owner.get();
+    std::unique_ptr<std::uint8_t[]> memory(new std::uint8_t[std::max<std::uint64_t>(claimed, 1)]);
     try {
-      size = decompressTo(compression, chunk.data, chunk.size, owner.get(), claimed);
+      bytes.size = decompressTo(compression, bytes.data, bytes.size, memory.get(), claimed);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("a damaged chunk ({}): expected {} bytes of messages",
                                            error.what(), claimed));
     }
+    bytes.memory = std::move(memory);
+    bytes.data = bytes.memory.get();
   }
-  if (size != claimed) {
+  if (bytes.size != claimed) {
     throw std::runtime_error(
-        fmt::format("a chunk with {} bytes of messages: expected {}", size, claimed));
+        fmt::format("a chunk with {} bytes of messages: expected {}", bytes.size, claimed));
   }
-  return result;
+  return bytes;
 }
 
 ChunkedBag::ChunkedBag(std::filesystem::path file, std::string_view repair)
@@ -128,7 +125,7 @@ BagCursor ChunkedBag::messages(std::size_t topic, std::int64_t from_log_ns) {
         const ChunkMessages::Message& found = chunk->messages[next_message++];
         if (found.topic != topic || (!begun && found.log_ns < from_log_ns)) continue;
         begun = true;
-        message = {found.log_ns, found.data, found.size, found.cdr};
+        message = found;
         return true;
       }
       chunk.reset();
@@ -160,9 +157,9 @@ std::shared_ptr<const ChunkMessages> ChunkedBag::chunkAt(std::size_t index) {
   auto chunk = std::make_shared<const ChunkMessages>(readChunk(chunks_[index]));
   recent_.emplace_back(index, chunk);
   std::size_t bytes = 0;
-  for (const auto& entry : recent_) bytes += entry.second->size;
+  for (const auto& entry : recent_) bytes += entry.second->bytes.size;
   while (!recent_.empty() && bytes > kRecentBytes) {
-    bytes -= recent_.front().second->size;
+    bytes -= recent_.front().second->bytes.size;
     recent_.pop_front();
   }
   return chunk;

@@ -34,17 +34,19 @@ inline std::uint64_t topicBit(std::size_t topic) {
   return std::uint64_t{1} << std::min(topic, kLastBit);
 }
 
+/// Bytes of a chunk, and the memory that they lie in.
+struct ChunkBytes {
+  std::unique_ptr<std::uint8_t[]> memory;
+  const std::uint8_t* data = nullptr;
+  std::size_t size = 0;
+};
+
 /// The messages of a chunk, decompressed.
 struct ChunkMessages {
-  struct Message {
+  struct Message : BagMessage {
     std::size_t topic;
-    std::int64_t log_ns;
-    const std::uint8_t* data;
-    std::size_t size;
-    bool cdr;
   };
-  std::unique_ptr<std::uint8_t[]> bytes;
-  std::size_t size = 0;           // of `bytes`
+  ChunkBytes bytes;
   std::vector<Message> messages;  // in the order of the file; refer to `bytes`
 };
 
@@ -95,21 +97,12 @@ enum class ChunkCompression { kNone, kBz2, kLz4, kZstd };
 ChunkCompression chunkCompression(std::string_view name,
                                   std::initializer_list<std::string_view> known);
 
-/// The messages of a chunk as the file has them.
-struct PackedChunk {
-  std::unique_ptr<std::uint8_t[]> file;  ///< Owns `data`.
-  const std::uint8_t* data;
-  std::size_t size;
-};
-
 /// Decompresses a chunk.
 /// @param claimed its size when decompressed, at most 1 GiB. Memory is used only as far as there
 /// are bytes for it.
-/// @param owner of the result.
 /// @return `claimed` bytes.
 /// @throws std::runtime_error, without the file's name, where the data are damaged or have another
 /// size.
-const std::uint8_t* unpackChunk(ChunkCompression compression, PackedChunk chunk,
-                                std::uint64_t claimed, std::unique_ptr<std::uint8_t[]>& owner);
+ChunkBytes unpackChunk(ChunkCompression compression, ChunkBytes packed, std::uint64_t claimed);
 
 }  // namespace efm

@@ -27,7 +27,6 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kRos1Start = "#ROSBAG V";
 constexpr std::string_view kDb3Start("SQLite format 3\0", 16);
-constexpr std::string_view kMcapStart("\x89MCAP0\r\n", 8);
 constexpr std::string_view kZstdStart = "\x28\xb5\x2f\xfd";
 constexpr const char* kMetadata = "metadata.yaml";
 
@@ -52,7 +51,7 @@ std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
 #endif
 #ifdef EFM_WITH_ROS2
   if (beginsWith(file, kDb3Start)) return openDb3(file);
-  if (beginsWith(file, kMcapStart)) return openMcap(file);
+  if (beginsWith(file, kMcapMagic)) return openMcap(file);
 #endif
   if (ros1 || looksLikeRosbag2(file)) {
     throw std::runtime_error(fmt::format("{}: this build does not read bags of ROS {} ({})",
@@ -309,7 +308,7 @@ bool looksLikeRosbag2(const fs::path& source) {
     std::string line;
     return std::getline(stream, line) && line.rfind("rosbag2_bagfile_information", 0) == 0;
   }
-  return beginsWith(source, kDb3Start) || beginsWith(source, kMcapStart) || isCompressedBag(source);
+  return beginsWith(source, kDb3Start) || beginsWith(source, kMcapMagic) || isCompressedBag(source);
 }
 
 RecordingParts openBags(const std::vector<std::filesystem::path>& files,

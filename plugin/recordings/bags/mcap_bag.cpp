@@ -58,7 +58,7 @@ class McapBag : public ChunkedBag {
   bool readSummary();
   void scanFile();
   static void takeTimes(const ChunkMessages& found, BagChunk& chunk);
-  void addMessages(ByteReader records, ChunkMessages& chunk);
+  ChunkMessages messagesIn(ChunkBytes bytes);
   void takeSchemaOrChannel(McapRecord& record);
   BagChunk chunkOfIndex(ByteReader content) const;
 
@@ -229,38 +229,35 @@ void McapBag::takeTimes(const ChunkMessages& found, BagChunk& chunk) {
 }
 
 ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
-  auto file = readBytes(chunk.offset, chunk.size);
+  ChunkBytes file = {readBytes(chunk.offset, chunk.size), nullptr, chunk.size};
+  file.data = file.memory.get();
   return located(chunk.offset, [&] {
-    ChunkMessages messages;
-    ByteReader bytes(file.get(), chunk.size);
-    if (chunk.size > 0 && static_cast<McapOp>(*file.get()) == McapOp::kMessage) {
-      messages.bytes = std::move(file);
-      messages.size = chunk.size;
-      addMessages(bytes, messages);
-      return messages;
+    if (chunk.size > 0 && static_cast<McapOp>(*file.data) == McapOp::kMessage) {
+      return messagesIn(std::move(file));
     }
-    McapRecord record = takeMcapRecord(bytes);
-    if (record.op != McapOp::kChunk) {
+    ByteReader bytes(file.data, file.size);
+    auto [op, content] = takeMcapRecord(bytes);
+    if (op != McapOp::kChunk) {
       throw std::runtime_error(
-          fmt::format("record of op {}: expected a chunk", static_cast<int>(record.op)));
+          fmt::format("record of op {}: expected a chunk", static_cast<int>(op)));
     }
-    ByteReader& content = record.content;
     content.take(8 + 8);  // first and last log time
     const std::uint64_t size = content.number<std::uint64_t>();
     const std::uint32_t checksum = content.number<std::uint32_t>();
     const ChunkCompression compression = chunkCompression(takeText(content), {"", "lz4", "zstd"});
-    const std::uint64_t packed = content.number<std::uint64_t>();
-    const std::uint8_t* const data = content.take(packed);
-    const std::uint8_t* const records =
-        unpackChunk(compression, {std::move(file), data, packed}, size, messages.bytes);
-    messages.size = size;
-    requireChecksum(checksum, records, size);
-    addMessages(ByteReader(records, size), messages);
-    return messages;
+    file.size = content.number<std::uint64_t>();
+    file.data = content.take(file.size);
+    ChunkBytes records = unpackChunk(compression, std::move(file), size);
+    requireChecksum(checksum, records.data, records.size);
+    return messagesIn(std::move(records));
   });
 }
 
-void McapBag::addMessages(ByteReader records, ChunkMessages& chunk) {
+/// @param bytes records.
+ChunkMessages McapBag::messagesIn(ChunkBytes bytes) {
+  ChunkMessages chunk;
+  ByteReader records(bytes.data, bytes.size);
+  chunk.bytes = std::move(bytes);
   while (records.remaining() > 0) {
     McapRecord record = takeMcapRecord(records);
     takeSchemaOrChannel(record);
@@ -273,8 +270,9 @@ void McapBag::addMessages(ByteReader records, ChunkMessages& chunk) {
     if (channel == channels_.end()) continue;
     const std::size_t size = content.remaining();
     chunk.messages.push_back(
-        {channel->second.topic, log_ns, content.take(size), size, channel->second.cdr});
+        {{log_ns, content.take(size), size, channel->second.cdr}, channel->second.topic});
   }
+  return chunk;
 }
 
 }  // namespace

@@ -208,16 +208,15 @@ ChunkMessages Ros1Bag::readChunk(const BagChunk& chunk) {
         chunkCompression(record.fields.text("compression"), {"none", "bz2", "lz4"});
     const std::uint32_t size = record.fields.number<std::uint32_t>("size");
     ChunkMessages chunk_messages;
-    const std::uint8_t* const data = unpackChunk(
-        compression, {std::move(file), record.data, record.size}, size, chunk_messages.bytes);
-    chunk_messages.size = size;
-    ByteReader messages(data, size);
+    chunk_messages.bytes =
+        unpackChunk(compression, {std::move(file), record.data, record.size}, size);
+    ByteReader messages(chunk_messages.bytes.data, size);
     while (messages.remaining() > 0) {
       const Ros1Record message = takeRecord(messages);
       if (message.fields.op() != Ros1Op::kMessage) continue;
       if (const auto topic = topicOf(message.fields.number<std::uint32_t>("conn"))) {
         chunk_messages.messages.push_back(
-            {*topic, message.fields.time("time"), message.data, message.size, false});
+            {{message.fields.time("time"), message.data, message.size, false}, *topic});
       }
     }
     return chunk_messages;

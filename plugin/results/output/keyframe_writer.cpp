@@ -29,9 +29,7 @@ std::string npyHeader(int planes, const ReferenceView& view) {
   const std::size_t padding = 63 - (kPrefix + dictionary.size()) % 64;
   dictionary += std::string(padding, ' ') + "\n";
   const auto length = static_cast<std::uint16_t>(dictionary.size());
-  std::string header = "\x93NUMPY";
-  header += '\x01';
-  header += '\x00';
+  std::string header("\x93NUMPY\1\0", 8);
   header += static_cast<char>(length & 0xff);
   header += static_cast<char>(length >> 8);
   return header + dictionary;

@@ -159,10 +159,6 @@ std::function<void(const std::filesystem::path&)> byStream(
   };
 }
 
-void writePictureTo(std::ostream& stream, const std::string& extension, const cv::Mat& image) {
-  stream << (extension == ".png" ? encodePng(image, PngPacking::kQuick) : encodeTiff(image));
-}
-
 }  // namespace
 
 bool EarlierResult::isOf(const std::vector<std::string>& files) const {
@@ -295,9 +291,11 @@ void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& ima
     not_on_disk_.insert(part);
     part = part.parent_path();
   }
-  const std::string extension = path.extension().string();
-  write(path, byStream([&](std::ostream& file) { writePictureTo(file, extension, image); }),
-        DiskSync::kLater);
+  const bool png = path.extension() == ".png";
+  const auto encode = [&](std::ostream& file) {
+    file << (png ? encodePng(image, PngPacking::kQuick) : encodeTiff(image));
+  };
+  write(path, byStream(encode), DiskSync::kLater);
 }
 
 void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) {
@@ -306,11 +304,8 @@ void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& ma
   const bool plain = style_ == PictureStyle::kPlain;
   writeImage(folder / "depth.png", plain ? depthPicture(map.depth, limits_, Palette::kBlueToRed)
                                          : depthFigure(map, limits_));
-  if (plain) {
-    writeImage(folder / "confidence.png", confidencePicture(map.confidence));
-  } else {
-    writeImage(folder / "confidence.png", confidenceFigure(map.confidence));
-  }
+  writeImage(folder / "confidence.png",
+             plain ? confidencePicture(map.confidence) : confidenceFigure(map.confidence));
 }
 
 void MapOutput::writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses) {
