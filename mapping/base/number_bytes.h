@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <ostream>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,122 @@
 #include <type_traits>
 
 namespace efm {
+
+/// A number from its bytes, on any machine.
+template <typename Number>
+Number numberFrom(const void* bytes, bool big_endian) {
+  static_assert(std::is_arithmetic_v<Number>);
+  std::array<char, sizeof(Number)> ordered;
+  std::memcpy(ordered.data(), bytes, sizeof(Number));
+  constexpr bool kBigEndianMachine = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+  if (big_endian != kBigEndianMachine) std::reverse(ordered.begin(), ordered.end());
+  Number number;
+  std::memcpy(&number, ordered.data(), sizeof(Number));
+  return number;
+}
+
+/// Writes a number with its lowest byte first, on any machine.
+template <typename Number>
+void writeLittleEndian(std::ostream& stream, Number number) {
+  const auto ordered = numberFrom<Number>(&number, false);
+  stream.write(reinterpret_cast<const char*>(&ordered), sizeof(Number));
+}
+
+/// The types of numbers in files.
+enum class NumberType {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kFloat32,
+  kFloat64,
+};
+
+/// Calls `visit` with a zero of the type.
+template <typename Visit>
+auto withNumberOf(NumberType type, const Visit& visit) {
+  switch (type) {
+    case NumberType::kInt8:
+      return visit(std::int8_t{});
+    case NumberType::kUint8:
+      return visit(std::uint8_t{});
+    case NumberType::kInt16:
+      return visit(std::int16_t{});
+    case NumberType::kUint16:
+      return visit(std::uint16_t{});
+    case NumberType::kInt32:
+      return visit(std::int32_t{});
+    case NumberType::kUint32:
+      return visit(std::uint32_t{});
+    case NumberType::kInt64:
+      return visit(std::int64_t{});
+    case NumberType::kUint64:
+      return visit(std::uint64_t{});
+    case NumberType::kFloat32:
+      return visit(float{});
+    case NumberType::kFloat64:
+      break;
+  }
+  return visit(double{});
+}
+
+inline std::size_t sizeOf(NumberType type) {
+  return withNumberOf(type, [](auto number) { return sizeof(number); });
+}
+
+inline bool isReal(NumberType type) {
+  return type == NumberType::kFloat32 || type == NumberType::kFloat64;
+}
+
+/// The type of a kind and a size: 'i' is whole with a sign, 'u' without one, 'f' is real.
+/// @return std::nullopt if there is no such type.
+inline std::optional<NumberType> numberTypeOf(char kind, std::size_t bytes) {
+  for (int k = 0; k <= static_cast<int>(NumberType::kFloat64); ++k) {
+    const auto type = static_cast<NumberType>(k);
+    const bool has_kind = withNumberOf(type, [kind](auto number) {
+      using Number = decltype(number);
+      return kind == (std::is_floating_point_v<Number> ? 'f'
+                      : std::is_signed_v<Number>       ? 'i'
+                                                       : 'u');
+    });
+    if (has_kind && sizeOf(type) == bytes) return type;
+  }
+  return std::nullopt;
+}
+
+/// A number from its `sizeOf(type)` bytes.
+inline double numberAt(const char* at, NumberType type, bool big_endian) {
+  return withNumberOf(type, [&](auto zero) {
+    return static_cast<double>(numberFrom<decltype(zero)>(at, big_endian));
+  });
+}
+
+/// Numbers in memory at equal distances: a list, a column of a matrix, or a field of records.
+struct Column {
+  const char* first = nullptr;
+  std::size_t stride = 0;  ///< Bytes from a number to the next one.
+  NumberType type = NumberType::kFloat64;
+  bool big_endian = false;
+
+  /// Calls `take(i, number)` for i from 0 to count - 1, up to the first number for which it returns
+  /// false. The number has the type of the file.
+  /// @return the first i for which it returned false; `count` if there was none.
+  template <typename Take>
+  std::size_t forEach(std::size_t count, const Take& take) const {
+    return withNumberOf(type, [&](auto zero) {
+      const char* at = first;
+      for (std::size_t i = 0; i < count; ++i, at += stride) {
+        if (!take(i, numberFrom<decltype(zero)>(at, big_endian))) return i;
+      }
+      return count;
+    });
+  }
+  double number(std::size_t i) const { return numberAt(first + i * stride, type, big_endian); }
+};
 
 /// Reads values from bytes one after the other. A value beyond the end is a std::runtime_error that
 /// says how many bytes are missing. Owns nothing.
@@ -29,14 +146,8 @@ class ByteReader {
 
   template <typename T>
   T number() {
-    static_assert(std::is_arithmetic_v<T>);
     if (aligned_) align(sizeof(T));
-    std::array<std::uint8_t, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), take(sizeof(T)), sizeof(T));
-    if (big_endian_) std::reverse(bytes.begin(), bytes.end());
-    T value;
-    std::memcpy(&value, bytes.data(), sizeof(T));
-    return value;
+    return numberFrom<T>(take(sizeof(T)), big_endian_);
   }
   const std::uint8_t* take(std::size_t size) {
     if (size > remaining()) {
@@ -67,17 +178,5 @@ class ByteReader {
   bool aligned_ = false;
   bool big_endian_ = false;
 };
-
-/// Writes a number with its lowest byte first, on any machine.
-template <typename Number>
-void writeLittleEndian(std::ostream& stream, Number number) {
-  constexpr std::uint16_t kOne = 1;
-  std::array<char, sizeof(Number)> bytes = {};
-  std::memcpy(bytes.data(), &number, sizeof(Number));
-  char first = 0;
-  std::memcpy(&first, &kOne, 1);
-  if (first != 1) std::reverse(bytes.begin(), bytes.end());
-  stream.write(bytes.data(), bytes.size());
-}
 
 }  // namespace efm

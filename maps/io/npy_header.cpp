@@ -57,23 +57,14 @@ struct NpyType {
 
 /// The type of "<f4"; nothing where it is no number.
 std::optional<NpyType> npyTypeOf(std::string_view descr) {
-  constexpr struct {
-    std::string_view name;
-    NumberType type;
-  } kTypes[] = {
-      {"i1", NumberType::kInt8},    {"u1", NumberType::kUint8},   {"b1", NumberType::kUint8},
-      {"i2", NumberType::kInt16},   {"u2", NumberType::kUint16},  {"i4", NumberType::kInt32},
-      {"u4", NumberType::kUint32},  {"i8", NumberType::kInt64},   {"u8", NumberType::kUint64},
-      {"f4", NumberType::kFloat32}, {"f8", NumberType::kFloat64},
-  };
   if (descr.size() != 3) return std::nullopt;
   const char order = descr[0];
-  for (const auto& [name, type] : kTypes) {
-    if (descr.substr(1) != name) continue;
-    if (order != '<' && order != '>' && !(order == '|' && sizeOf(type) == 1)) break;
-    return NpyType{type, order == '>'};
+  const char kind = descr.substr(1) == "b1" ? 'u' : descr[1];
+  const auto type = numberTypeOf(kind, static_cast<std::size_t>(descr[2] - '0'));
+  if (!type || !(order == '<' || order == '>' || (order == '|' && sizeOf(*type) == 1))) {
+    return std::nullopt;
   }
-  return std::nullopt;
+  return NpyType{*type, order == '>'};
 }
 
 std::runtime_error wrongNpyType(std::string_view descr) {

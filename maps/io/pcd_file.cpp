@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -40,18 +41,18 @@ HeaderLines readHeaderLines(TextScanner& scanner) {
 }
 
 NumberType numberType(const WordLine& types, const WordLine& sizes, std::size_t word) {
-  static const std::map<std::string, NumberType> known = {
-      {"I1", NumberType::kInt8},    {"U1", NumberType::kUint8},  {"I2", NumberType::kInt16},
-      {"U2", NumberType::kUint16},  {"I4", NumberType::kInt32},  {"U4", NumberType::kUint32},
-      {"I8", NumberType::kInt64},   {"U8", NumberType::kUint64}, {"F4", NumberType::kFloat32},
-      {"F8", NumberType::kFloat64},
-  };
-  const auto type = known.find(std::string(types.words[word]) + std::string(sizes.words[word]));
-  if (type == known.end()) {
-    types.refuse("TYPE " + inQuotes(types.words[word]) + " of SIZE " + inQuotes(sizes.words[word]) +
+  const std::string_view kind = types.words[word];
+  const std::string_view size = sizes.words[word];
+  std::optional<NumberType> type;
+  if (kind.size() == 1 && size.size() == 1) {
+    type = numberTypeOf(static_cast<char>(kind[0] - 'A' + 'a'),
+                        static_cast<std::size_t>(size[0] - '0'));
+  }
+  if (!type) {
+    types.refuse("TYPE " + inQuotes(kind) + " of SIZE " + inQuotes(size) +
                  ": expected I or U of 1, 2, 4 or 8 bytes, or F of 4 or 8");
   }
-  return type->second;
+  return *type;
 }
 
 std::vector<RecordField> fieldsOf(const HeaderLines& lines) {
@@ -116,13 +117,6 @@ Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField
   return origin;
 }
 
-std::uint64_t readNumber(TextScanner& scanner) {
-  std::uint64_t value = 0;
-  const std::string_view bytes = scanner.take(4);
-  for (std::size_t i = 4; i-- > 0;) value = value << 8U | static_cast<unsigned char>(bytes[i]);
-  return value;
-}
-
 PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> fields,
                                  std::uint64_t points) {
   const auto is_padding = [](const RecordField& field) { return field.name == "_"; };
@@ -130,8 +124,8 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
                fields.end());  // a compressed file does not hold it
 
   if (scanner.left() < 8) scanner.refuse("expected the sizes of the compressed points, 8 bytes");
-  const std::uint64_t packed_bytes = readNumber(scanner);
-  const std::uint64_t plain_bytes = readNumber(scanner);
+  const std::uint64_t packed_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
+  const std::uint64_t plain_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
   const std::size_t record_bytes = std::max<std::size_t>(bytesOf(fields), 1);
   if (plain_bytes % record_bytes != 0 || plain_bytes / record_bytes != points) {
     scanner.refuse(std::to_string(plain_bytes) + " bytes when decompressed: expected " +

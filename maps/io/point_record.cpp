@@ -5,9 +5,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <stdexcept>
+#include <type_traits>
 
 #include "mapping/base/text.h"
 
@@ -128,73 +128,18 @@ bool parseReal(std::string_view word, double& value) {
 }
 
 bool parseAs(NumberType type, std::string_view word, double& value) {
-  switch (type) {
-    case NumberType::kFloat32:
-      return parseReal<float>(word, value);
-    case NumberType::kFloat64:
-      return parseReal<double>(word, value);
-    case NumberType::kUint8:
-    case NumberType::kUint16:
-    case NumberType::kUint32:
-    case NumberType::kUint64:
-      return parseWhole<std::uint64_t>(word, value);
-    default:
-      return parseWhole<std::int64_t>(word, value);
-  }
-}
-
-template <typename Number, typename Bits>
-double bitsAs(std::uint64_t bits) {
-  static_assert(sizeof(Number) == sizeof(Bits));
-  const auto same_size = static_cast<Bits>(bits);
-  Number number;
-  std::memcpy(&number, &same_size, sizeof(number));
-  return static_cast<double>(number);
+  return withNumberOf(type, [&](auto zero) {
+    using Number = decltype(zero);
+    if constexpr (std::is_floating_point_v<Number>) {
+      return parseReal<Number>(word, value);
+    } else {
+      return parseWhole<std::conditional_t<std::is_signed_v<Number>, std::int64_t, std::uint64_t>>(
+          word, value);
+    }
+  });
 }
 
 }  // namespace
-
-double numberAt(const char* at, NumberType type, bool big_endian) {
-  const std::size_t size = sizeOf(type);
-  std::uint64_t bits = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const auto byte = static_cast<unsigned char>(at[big_endian ? i : size - 1 - i]);
-    bits = bits << 8U | byte;
-  }
-  switch (type) {
-    case NumberType::kInt8:
-      return bitsAs<std::int8_t, std::uint8_t>(bits);
-    case NumberType::kInt16:
-      return bitsAs<std::int16_t, std::uint16_t>(bits);
-    case NumberType::kInt32:
-      return bitsAs<std::int32_t, std::uint32_t>(bits);
-    case NumberType::kInt64:
-      return bitsAs<std::int64_t, std::uint64_t>(bits);
-    case NumberType::kFloat32:
-      return bitsAs<float, std::uint32_t>(bits);
-    case NumberType::kFloat64:
-      return bitsAs<double, std::uint64_t>(bits);
-    default:
-      return static_cast<double>(bits);
-  }
-}
-
-std::size_t sizeOf(NumberType type) {
-  switch (type) {
-    case NumberType::kInt8:
-    case NumberType::kUint8:
-      return 1;
-    case NumberType::kInt16:
-    case NumberType::kUint16:
-      return 2;
-    case NumberType::kInt32:
-    case NumberType::kUint32:
-    case NumberType::kFloat32:
-      return 4;
-    default:
-      return 8;
-  }
-}
 
 std::size_t bytesOf(const std::vector<RecordField>& fields) {
   std::size_t bytes = 0;
@@ -249,20 +194,24 @@ PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<Reco
   const auto points = static_cast<std::size_t>(count);
   const char* bytes = scanner.take(points * record_bytes).data();
 
+  std::array<std::optional<Column>, 4> columns;
+  std::size_t before = 0;  // bytes of a point in the fields before this one
+  for (std::size_t at = 0; at < fields.size(); ++at) {
+    const std::size_t size = fields[at].count * sizeOf(fields[at].type);
+    for (std::size_t j = 0; j < indices.size(); ++j) {
+      if (indices[j] != at) continue;
+      columns[j] = Column{bytes + (order.by_field ? points * before : before),
+                          order.by_field ? size : record_bytes, fields[at].type, order.big_endian};
+    }
+    before += size;
+  }
+
   PointCloudContent content;
   content.points.reserve(points);
   for (std::size_t i = 0; i < points; ++i) {
     Values values = {0, 0, 0, 1};
-    std::size_t before = 0;  // bytes of a point in the fields before this one
-    for (std::size_t at = 0; at < fields.size(); ++at) {
-      const std::size_t size = fields[at].count * sizeOf(fields[at].type);
-      for (std::size_t j = 0; j < indices.size(); ++j) {
-        if (indices[j] != at) continue;
-        const std::size_t offset =
-            order.by_field ? points * before + i * size : i * record_bytes + before;
-        values[j] = numberAt(bytes + offset, fields[at].type, order.big_endian);
-      }
-      before += size;
+    for (std::size_t j = 0; j < values.size(); ++j) {
+      if (columns[j]) values[j] = columns[j]->number(i);
     }
     append(content, values);
   }

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/number_bytes.h"
 #include "maps/io/point_cloud_file.h"
 
 namespace efm {
@@ -53,26 +54,6 @@ struct WordLine {
 
 /// The words of `TextScanner::line`.
 WordLine wordLine(TextScanner& scanner, std::string_view expected);
-
-/// The number types of PCD and PLY files.
-enum class NumberType {
-  kInt8,
-  kUint8,
-  kInt16,
-  kUint16,
-  kInt32,
-  kUint32,
-  kInt64,
-  kUint64,
-  kFloat32,
-  kFloat64,
-};
-
-std::size_t sizeOf(NumberType type);
-
-/// Reads one number from its bytes.
-/// @param at `sizeOf(type)` bytes.
-double numberAt(const char* at, NumberType type, bool big_endian);
 
 /// One field of a point in a file: `count` numbers of one type.
 struct RecordField {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,21 +18,21 @@
 
 namespace {
 
-constexpr std::size_t kBlockRows = 256;
-
-void readNumbers(efm::NpyArray& array) {
+/// Numbers of some rows in each block.
+void readNumbers(const std::shared_ptr<efm::NpyArray>& array, std::uint64_t first) {
   constexpr std::uint64_t kMaxRows = 100'000;
-  while (array.position() < kMaxRows) {
-    const std::size_t rows = array.readRows(kBlockRows);
-    if (rows == 0) return;
-    for (std::size_t row = 0; row < rows; row += std::max<std::size_t>(rows - 1, 1)) {
-      for (std::size_t column = 0; column < array.columns(); ++column) {
-        array.number(row, column);
-        array.whole(row, column);
-        array.time(row, column, 0);
-        array.time(row, column, -9);
+  for (std::uint64_t row = first; row < std::min(array->size(), kMaxRows);) {
+    const std::uint64_t end = array->blockAt(row).end;
+    const std::uint64_t rows = end - row;
+    for (; row < end; row += std::max<std::uint64_t>(rows / 256, 1)) {
+      for (std::size_t k = 0; k < array->columns(); ++k) {
+        const efm::RowColumn column = efm::NpyArray::columnOf(array, k);
+        column.number(row);
+        column.time(row, 1'000'000'000);
+        column.time(row, 1);
       }
     }
+    row = end;
   }
 }
 
@@ -44,18 +45,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (efm::isCompressed(path)) {
     efm::fuzz::readOrRefuse(path, [&] {
       for (const std::string& member : efm::membersOf(path)) {
-        efm::fuzz::readOrRefuse(path, [&] {
-          efm::NpyArray array(path, member);
-          readNumbers(array);
-        });
+        efm::fuzz::readOrRefuse(
+            path, [&] { readNumbers(std::make_shared<efm::NpyArray>(path, member), 0); });
       }
     });
   } else {
     efm::fuzz::readOrRefuse(path, [&] {
-      efm::NpyArray array(path);
-      readNumbers(array);
-      array.seek(array.rows() / 2);
-      readNumbers(array);
+      const auto array = std::make_shared<efm::NpyArray>(path);
+      readNumbers(array, 0);
+      readNumbers(array, array->size() / 2);
     });
   }
   efm::fuzz::readOrRefuse(path, [&] { efm::readPoseArrays(path, {}); });

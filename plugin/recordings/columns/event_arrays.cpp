@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <stdexcept>
 #include <utility>
@@ -16,9 +15,6 @@
 
 namespace efm {
 namespace {
-
-constexpr std::size_t kBlockRows = std::size_t{1} << 16;
-constexpr std::size_t kArrayBlockBytes = std::size_t{1} << 23;
 
 namespace fs = std::filesystem;
 
@@ -141,69 +137,64 @@ bool isMetavision(const std::vector<NpyField>& fields) {
 }
 
 /// The columns with these names; the name of t may say its unit.
-template <typename ColumnOf>
-NpyEventColumns columnsNamed(const EventNames& names, const ColumnOf& column) {
-  NpyEventColumns columns;
-  columns.t = column(names.t);
-  columns.x = column(names.x);
-  columns.y = column(names.y);
-  columns.p = column(names.p);
-  columns.time_exponent = headerWord(names.t).time_exponent;
-  return columns;
+/// @param column gives the column of a name.
+template <typename ColumnNamed>
+EventTable tableOf(const EventNames& names, const ColumnNamed& column) {
+  EventTable table;
+  table.t = column(names.t);
+  table.x = column(names.x);
+  table.y = column(names.y);
+  table.p = column(names.p);
+  const std::optional<int> exponent = headerWord(names.t).time_exponent;
+  if (exponent) table.time_unit_ns = nanosecondsPer(*exponent);
+  return table;
 }
 
 /// The columns of a structured array.
-NpyEventColumns fieldsOf(const fs::path& file, const FoundArray& found,
-                         const ReaderOptions& options) {
+EventTable fieldsOf(const fs::path& file, const FoundArray& found, const ReaderOptions& options) {
   std::vector<std::string> all;
   for (const NpyField& field : found.header.fields) all.push_back(field.name);
   const std::optional<EventNames> names = namesOf(all, options);
   if (!names) refuse(file, {found}, options);
   const auto array = std::make_shared<NpyArray>(file, found.member, NpyPart{true, {}, false});
-  NpyEventColumns columns = columnsNamed(*names, [&](const std::string& name) {
-    return NpyColumn{array, indexOf(name, all)};
+  EventTable table = tableOf(*names, [&](const std::string& name) {
+    return NpyArray::columnOf(array, indexOf(name, all));
   });
-  if (isMetavision(found.header.fields)) columns.time_exponent = -6;
-  return columns;
+  if (isMetavision(found.header.fields)) table.time_unit_ns = kNanosecondsPerMicrosecond;
+  return table;
 }
 
 /// The columns of N x 4 or 4 x N numbers.
-NpyEventColumns matrixColumnsOf(const fs::path& file, const FoundArray& found,
-                                const ReaderOptions& options) {
+EventTable matrixColumnsOf(const fs::path& file, const FoundArray& found,
+                           const ReaderOptions& options) {
   const std::size_t count = columnsOf(options);
   const bool lying = isLying(found.header.shape, count);
-  std::vector<NpyColumn> all;
-  if (lying != found.header.fortran_order) {
-    for (std::size_t k = 0; k < count; ++k) {
-      all.push_back({std::make_shared<NpyArray>(file, found.member, NpyPart{false, k, false}), 0});
-    }
-  } else {
-    // Rows one after the other: of N x 4 in C order, or of 4 x N in Fortran order.
-    const auto array = std::make_shared<NpyArray>(file, found.member, NpyPart{false, {}, lying});
-    for (std::size_t k = 0; k < count; ++k) all.push_back({array, k});
+  // Rows one after the other: of N x 4 in C order, or of 4 x N in Fortran order. Else columns.
+  const bool by_rows = lying == found.header.fortran_order;
+  std::shared_ptr<NpyArray> array;
+  std::vector<RowColumn> all;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!by_rows) array = std::make_shared<NpyArray>(file, found.member, NpyPart{false, k, false});
+    if (!array) array = std::make_shared<NpyArray>(file, found.member, NpyPart{false, {}, lying});
+    all.push_back(NpyArray::columnOf(array, by_rows ? k : 0));
   }
-  constexpr std::size_t kSample = 5000;
-  EventRows rows;
-  for (const NpyColumn& column : all) {
-    const std::size_t sampled = column.array->sampleRows(kSample);
-    rows.resize(&column == &all.front() ? sampled : std::min(rows.size(), sampled));
-    for (std::size_t row = 0; row < rows.size(); ++row) {
-      rows[row].push_back(column.array->number(row, column.index));
-    }
+  EventRows rows(sampledRows(all.front()));
+  for (const RowColumn& column : all) {
+    for (std::size_t row = 0; row < rows.size(); ++row) rows[row].push_back(column.number(row));
   }
-  NpyEventColumns columns;
-  const std::string order = findColumnOrder(rows, options, file.string(), columns.warnings);
-  columns.t = all[order.find('t')];
-  columns.x = all[order.find('x')];
-  columns.y = all[order.find('y')];
-  columns.p = all[order.find('p')];
-  return columns;
+  EventTable table;
+  const std::string order = findColumnOrder(rows, options, file.string(), table.warnings);
+  table.t = all[order.find('t')];
+  table.x = all[order.find('x')];
+  table.y = all[order.find('y')];
+  table.p = all[order.find('p')];
+  return table;
 }
 
 /// The columns of an array each; nothing where the archive has not all of them.
-std::optional<NpyEventColumns> separateColumnsOf(const fs::path& file,
-                                                 const std::vector<FoundArray>& arrays,
-                                                 const ReaderOptions& options) {
+std::optional<EventTable> separateColumnsOf(const fs::path& file,
+                                            const std::vector<FoundArray>& arrays,
+                                            const ReaderOptions& options) {
   std::vector<std::string> names_of_lists;
   std::vector<std::string> members;
   for (const FoundArray& array : arrays) {
@@ -215,12 +206,13 @@ std::optional<NpyEventColumns> separateColumnsOf(const fs::path& file,
   }
   const std::optional<EventNames> names = namesOf(names_of_lists, options);
   if (!names) return std::nullopt;
-  return columnsNamed(*names, [&](const std::string& name) {
-    return NpyColumn{std::make_shared<NpyArray>(file, members[indexOf(name, names_of_lists)]), 0};
+  return tableOf(*names, [&](const std::string& name) {
+    return NpyArray::columnOf(
+        std::make_shared<NpyArray>(file, members[indexOf(name, names_of_lists)]), 0);
   });
 }
 
-NpyEventColumns eventColumnsOf(const fs::path& file, const ReaderOptions& options) {
+EventTable eventColumnsOf(const fs::path& file, const ReaderOptions& options) {
   std::vector<FoundArray> arrays;
   if (beginsWith(file, "PK")) {
     for (const std::string& member : membersOf(file)) {
@@ -229,7 +221,7 @@ NpyEventColumns eventColumnsOf(const fs::path& file, const ReaderOptions& option
       } catch (const std::runtime_error&) {  // Python objects, beside the events
       }
     }
-    if (auto columns = separateColumnsOf(file, arrays, options)) return *std::move(columns);
+    if (auto table = separateColumnsOf(file, arrays, options)) return *std::move(table);
   } else {
     arrays.push_back({"", readNpyHeader(file)});
   }
@@ -243,129 +235,22 @@ NpyEventColumns eventColumnsOf(const fs::path& file, const ReaderOptions& option
                                  : matrixColumnsOf(file, found, options);
 }
 
-class ArrayEvents : public EventStream {
- public:
-  ArrayEvents(NpyEventColumns columns, const ReaderOptions& options)
-      : columns_(std::move(columns)), block_rows_(kBlockRows) {
-    for (const NpyColumn* column : {&columns_.t, &columns_.x, &columns_.y, &columns_.p}) {
-      const std::shared_ptr<NpyArray>& array = column->array;
-      if (std::find(arrays_.begin(), arrays_.end(), array) != arrays_.end()) continue;
-      const std::uint64_t rows = columns_.t.array->rows();
-      if (array->rows() != rows) {
-        throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", array->name(),
-                                             array->rows(), rows, name()));
-      }
-      arrays_.push_back(array);
-      block_rows_ = std::clamp<std::size_t>(
-          kArrayBlockBytes / std::max<std::size_t>(1, array->rowBytes()), 1, block_rows_);
-    }
-    time_exponent_ = columns_.time_exponent ? *columns_.time_exponent : findExponent(options);
-  }
-
-  bool read(std::vector<Event>& events) override {
-    events.clear();
-    begin_ = columns_.t.array->position();
-    const std::size_t rows = readRows(block_rows_);
-    events.reserve(rows);
-    for (std::size_t row = 0; row < rows; ++row) events.push_back(eventAt(row));
-    return rows > 0;
-  }
-  void seek(std::int64_t t_ns) override {
-    NpyArray& times = *columns_.t.array;
-    if (!std::all_of(arrays_.begin(), arrays_.end(),
-                     [](const auto& array) { return array->canSeek(); })) {
-      return;
-    }
-    // An event of t_ns or later is not before one that is more than 10 ms older.
-    const std::int64_t before_ns = t_ns - kMaxEventDelayNs;
-    std::uint64_t low = 0;
-    std::uint64_t high = times.rows();
-    while (low < high) {
-      const std::uint64_t middle = low + (high - low) / 2;
-      times.seek(middle);
-      times.readRows(1);
-      const std::optional<std::int64_t> t = times.time(0, columns_.t.index, time_exponent_);
-      if (t && *t < before_ns) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    seekRow(low);
-  }
-  std::string positionOf(std::size_t index) const override {
-    return fmt::format("{}: row {}", name(), begin_ + index);
-  }
-  std::string name() const override { return columns_.t.array->name(); }
-  double progress() const override {
-    const NpyArray& times = *columns_.t.array;
-    return times.rows() == 0
-               ? 1
-               : static_cast<double>(times.position()) / static_cast<double>(times.rows());
-  }
-  std::optional<CameraSize> size() const override { return columns_.size; }
-  std::vector<Warning> warnings() const override { return columns_.warnings; }
-
- private:
-  std::size_t readRows(std::size_t max_rows) {
-    std::size_t rows = 0;
-    for (const auto& array : arrays_) rows = array->readRows(max_rows);
-    return rows;
-  }
-  void seekRow(std::uint64_t row) {
-    for (const auto& array : arrays_) array->seek(row);
-  }
-  int findExponent(const ReaderOptions& options) {
-    constexpr std::size_t kSample = 5000;
-    const NpyColumn& t = columns_.t;
-    TimeSample sample;
-    const std::size_t rows = t.array->sampleRows(std::min(kSample, block_rows_));
-    for (std::size_t row = 0; row < rows; ++row) {
-      sample.add(t.array->number(row, t.index));
-    }
-    TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, name());
-    if (unit.warning) columns_.warnings.push_back(std::move(*unit.warning));
-    return unit.exponent;
-  }
-  Event eventAt(std::size_t row) const {
-    const NpyColumn& t = columns_.t;
-    const std::optional<std::int64_t> t_ns = t.array->time(row, t.index, time_exponent_);
-    if (!t_ns) {
-      throw t.array->failure(
-          begin_ + row,
-          fmt::format("t = {}: expected {}", t.array->number(row, t.index), kExpectedTime));
-    }
-    const double polarity = columns_.p.array->number(row, columns_.p.index);
-    if (polarity != 0 && std::abs(polarity) != 1) {
-      throw columns_.p.array->failure(
-          begin_ + row, fmt::format("p = {}: expected polarity 0 or 1, or -1 or 1", polarity));
-    }
-    Event event;
-    event.t_ns = *t_ns;
-    event.x = pixel(columns_.x, row, "x");
-    event.y = pixel(columns_.y, row, "y");
-    event.polarity = (polarity == 1) != columns_.inverted;
-    return event;
-  }
-  std::uint16_t pixel(const NpyColumn& column, std::size_t row, const char* name) const {
-    const double value = column.array->number(row, column.index);
-    if (const auto pixel = wholeNumber(value, 0, 65'535)) return static_cast<std::uint16_t>(*pixel);
-    throw column.array->failure(
-        begin_ + row, fmt::format("{} = {}: expected a whole number from 0 to 65535", name, value));
-  }
-
-  NpyEventColumns columns_;
-  std::vector<std::shared_ptr<NpyArray>> arrays_;  // each once
-  std::size_t block_rows_;
-  int time_exponent_ = 0;
-  std::uint64_t begin_ = 0;  // row of the block
-};
-
 }  // namespace
 
-std::unique_ptr<EventStream> openArrayEvents(NpyEventColumns columns,
-                                             const ReaderOptions& options) {
-  return std::make_unique<ArrayEvents>(std::move(columns), options);
+std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptions& options) {
+  const auto array_of = [](const RowColumn& column) -> const NpyArray& {
+    return static_cast<const NpyArray&>(*column.rows);
+  };
+  const std::uint64_t rows = table.t.rows->size();
+  table.name = table.times = array_of(table.t).name();
+  for (const RowColumn* column : {&table.x, &table.y, &table.p}) {
+    if (column->rows->size() == rows) continue;
+    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has",
+                                         array_of(*column).name(), column->rows->size(), rows,
+                                         table.name));
+  }
+  table.seek_margin_ns = kMaxEventDelayNs;
+  return eventsOf(std::move(table), options);
 }
 
 bool looksLikeNumpy(const fs::path& file) {
@@ -390,9 +275,9 @@ bool looksLikeNumpy(const fs::path& file) {
 RecordingParts openEventArrays(const std::vector<fs::path>& files, const ReaderOptions& options) {
   RecordingParts parts;
   for (const fs::path& file : files) {
-    NpyEventColumns columns = eventColumnsOf(file, options);
-    if (!options.time_unit.empty()) columns.time_exponent.reset();  // as for text
-    parts.cameras.push_back(std::make_unique<ArrayEvents>(std::move(columns), options));
+    EventTable table = eventColumnsOf(file, options);
+    if (!options.time_unit.empty()) table.time_unit_ns.reset();  // as for text
+    parts.cameras.push_back(openArrayEvents(std::move(table), options));
   }
   return parts;
 }

@@ -14,29 +14,12 @@
 
 namespace efm {
 
-/// A number of each row of an array.
-struct NpyColumn {
-  std::shared_ptr<NpyArray> array;
-  std::size_t index = 0;
-};
-
-/// Where the numbers of events are: columns of one array, or of several with as many rows.
-struct NpyEventColumns {
-  NpyColumn t;
-  NpyColumn x;
-  NpyColumn y;
-  NpyColumn p;
-  std::optional<int> time_exponent;  ///< If it is known: 10^exponent seconds. Else it is found.
-  bool inverted = false;             ///< Polarity 0 is on.
-  std::optional<CameraSize> size;    ///< Of the sensor, if it is known.
-  std::vector<Warning> warnings;     ///< About the columns.
-};
-
-/// The events of a camera in NumPy arrays. Polarity is 0 or 1, or -1 or 1. Memory is that of a
-/// block. Arrays that are not compressed are sought by bisection.
+/// The events of a camera in columns of NumPy arrays. Polarity is 0 or 1, or -1 or 1. Arrays that
+/// are not compressed are sought by bisection.
+/// @param table t, x, y and p.
 /// @throws std::runtime_error naming the array of other length than t, or whose unit of time is
 /// not certain.
-std::unique_ptr<EventStream> openArrayEvents(NpyEventColumns columns, const ReaderOptions& options);
+std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptions& options);
 
 /// Events in NumPy arrays, a file per camera:
 ///   .npy    N x 4 or 4 x N numbers, whose order is found from the values as that of text;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 
 namespace efm {
@@ -42,8 +43,7 @@ std::vector<double> numbersOf(NpyArray array, std::size_t max_count) {
                                          array.header().count(), max_count));
   }
   std::vector<double> numbers;
-  const std::size_t rows = array.readRows(max_count);
-  for (std::size_t row = 0; row < rows; ++row) {
+  for (std::uint64_t row = 0; row < std::min<std::uint64_t>(array.size(), max_count); ++row) {
     for (std::size_t column = 0; column < array.columns(); ++column) {
       numbers.push_back(array.number(row, column));
     }
@@ -79,19 +79,23 @@ std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOption
   const auto xy = std::make_shared<NpyArray>(folder / "dataset_events_xy.npy");
   const auto p = std::make_shared<NpyArray>(folder / "dataset_events_p.npy");
   const auto require_shape = [&](const NpyArray& array, std::size_t columns) {
-    if (array.rows() == t->rows() && (array.columns() == columns || array.rows() == 0)) return;
+    if (array.size() == t->size() && (array.columns() == columns || array.size() == 0)) return;
     throw std::runtime_error(fmt::format("{}: {} rows of {} numbers: expected {} of {}",
-                                         array.name(), array.rows(), array.columns(), t->rows(),
+                                         array.name(), array.size(), array.columns(), t->size(),
                                          columns));
   };
   require_shape(*t, 1);
   require_shape(*xy, 2);
   require_shape(*p, 1);
-  NpyEventColumns columns = {{t, 0}, {xy, 0}, {xy, 1}, {p, 0}, {}, false, {}, {}};
-  if (t->isReal()) columns.time_exponent = 0;
-  columns.inverted = isSamsung(folder);
-  columns.size = sizeOfDepth(folder);
-  return openArrayEvents(std::move(columns), options);
+  EventTable table;
+  table.t = NpyArray::columnOf(t, 0);
+  table.x = NpyArray::columnOf(xy, 0);
+  table.y = NpyArray::columnOf(xy, 1);
+  table.p = NpyArray::columnOf(p, 0);
+  if (isReal(table.t.type)) table.time_unit_ns = kNanosecondsPerSecond;
+  table.inverted = isSamsung(folder);
+  table.size = sizeOfDepth(folder);
+  return openArrayEvents(std::move(table), options);
 }
 
 }  // namespace

@@ -187,6 +187,7 @@ Hdf5Rows::Hdf5Rows(std::shared_ptr<const Hdf5File> file, std::string path)
   const auto numbers = productOf(sides_, 1, kMaxRowBytes / element_bytes_);
   if (!numbers) throw fail(fmt::format("expected rows of at most {} bytes", kMaxRowBytes));
   row_numbers_ = static_cast<std::size_t>(*numbers);
+  row_bytes_ = row_numbers_ * element_bytes_;
   if (rowBytes() == 0) size_ = 0;
   if (size_ > 0) readLayout();
 }
@@ -234,11 +235,9 @@ void Hdf5Rows::readFilters(hid_t creation) {
   }
 }
 
-const RowBlock& Hdf5Rows::blockAt(std::uint64_t row) {
-  if (row >= block_.first && row < block_.end) return block_;
+RowBlock Hdf5Rows::readBlock(std::uint64_t row) {
   const Hdf5CrashNote note(file_->path());
   const Hdf5Quiet quiet;
-  block_ = {};
   const std::uint64_t first = row - row % chunk_sides_[0];
   const std::uint64_t rows = std::min<std::uint64_t>(chunk_sides_[0], size_ - first);
   if (direct_) {
@@ -246,8 +245,7 @@ const RowBlock& Hdf5Rows::blockAt(std::uint64_t row) {
   } else {
     readSelection(first, rows);
   }
-  block_ = {rows_.data(), first, first + rows};
-  return block_;
+  return {reinterpret_cast<const char*>(rows_.data()), first, first + rows};
 }
 
 /// The chunks of a range of rows: one, or several beside each other.
@@ -327,61 +325,51 @@ void Hdf5Rows::readSelection(std::uint64_t first_row, std::uint64_t rows) {
   const Hdf5Id space(H5Dget_space(set_.get()), H5Sclose);
   if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(),
                           nullptr) < 0 ||
-      H5Dread(set_.get(), type(), memory.get(), space.get(), H5P_DEFAULT, rows_.data()) < 0) {
+      H5Dread(set_.get(), type_.get(), memory.get(), space.get(), H5P_DEFAULT, rows_.data()) < 0) {
     throw failAt(first_row, "cannot be read" + hdf5Cause());
   }
 }
 
-std::runtime_error Hdf5Rows::failAt(std::uint64_t row, std::string_view what) const {
-  return file_->fail(fmt::format("{}[{}]", path_, row), what);
+std::string Hdf5Rows::placeOf(std::uint64_t row) const {
+  return fmt::format("{}:{}[{}]", file_->path().string(), path_, row);
 }
 
-Hdf5Column::Type Hdf5Column::typeOf(const Hdf5Rows& rows, hid_t type) {
+NumberType Hdf5Rows::numberType(hid_t type) const {
   const H5T_class_t kind = H5Tget_class(type);
   const std::size_t bytes = H5Tget_size(type);
   if (kind == H5T_ENUM) {  // h5py's bool
     const Hdf5Id super(H5Tget_super(type), H5Tclose);
-    if (H5Tget_size(super.get()) == bytes) return typeOf(rows, super.get());
+    if (H5Tget_size(super.get()) == bytes) return numberType(super.get());
   }
   const bool little = bytes == 1 || H5Tget_order(type) == H5T_ORDER_LE;
-  if (kind == H5T_FLOAT && little && bytes == sizeof(float)) return Type::kFloat;
-  if (kind == H5T_FLOAT && little && bytes == sizeof(double)) return Type::kDouble;
-  if (kind == H5T_INTEGER && little) {
-    const bool has_sign = H5Tget_sign(type) == H5T_SGN_2;
-    switch (bytes) {
-      case 1:
-        return has_sign ? Type::kInt8 : Type::kUint8;
-      case 2:
-        return has_sign ? Type::kInt16 : Type::kUint16;
-      case 4:
-        return has_sign ? Type::kInt32 : Type::kUint32;
-      case 8:
-        return has_sign ? Type::kInt64 : Type::kUint64;
-      default:
-        break;
-    }
-  }
-  throw rows.fail("expected whole numbers of 1, 2, 4 or 8 bytes, float or double, little-endian");
+  const char letter = kind == H5T_FLOAT                ? 'f'
+                      : kind != H5T_INTEGER            ? ' '
+                      : H5Tget_sign(type) == H5T_SGN_2 ? 'i'
+                                                       : 'u';
+  const std::optional<NumberType> found = numberTypeOf(letter, bytes);
+  if (little && found) return *found;
+  throw fail("expected whole numbers of 1, 2, 4 or 8 bytes, float or double, little-endian");
 }
 
-Hdf5Column Hdf5Column::ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index) {
+RowColumn Hdf5Rows::ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index) {
   if (index >= rows->rowNumbers()) {
     throw rows->fail(fmt::format("{} columns: expected {} or more", rows->rowNumbers(), index + 1));
   }
-  const Type type = typeOf(*rows, rows->type());
+  const NumberType type = rows->numberType(rows->type_.get());
   const std::size_t offset = index * (rows->rowBytes() / rows->rowNumbers());
   return {std::move(rows), offset, type};
 }
 
-Hdf5Column Hdf5Column::ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field) {
+RowColumn Hdf5Rows::ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field) {
   const Hdf5Quiet quiet;
-  const bool is_compound = H5Tget_class(rows->type()) == H5T_COMPOUND && rows->rowNumbers() == 1;
-  const int index = is_compound ? H5Tget_member_index(rows->type(), field.c_str()) : -1;
+  const hid_t compound = rows->type_.get();
+  const bool is_compound = H5Tget_class(compound) == H5T_COMPOUND && rows->rowNumbers() == 1;
+  const int index = is_compound ? H5Tget_member_index(compound, field.c_str()) : -1;
   if (index < 0) throw rows->fail("expected a list of compound values with a field " + field);
   const auto member = static_cast<unsigned>(index);
-  const Hdf5Id member_type(H5Tget_member_type(rows->type(), member), H5Tclose);
-  const Type type = typeOf(*rows, member_type.get());
-  const std::size_t offset = H5Tget_member_offset(rows->type(), member);
+  const Hdf5Id member_type(H5Tget_member_type(compound, member), H5Tclose);
+  const NumberType type = rows->numberType(member_type.get());
+  const std::size_t offset = H5Tget_member_offset(compound, member);
   // The library does not compare them.
   const std::size_t bytes = rows->rowBytes();
   if (offset > bytes || H5Tget_size(member_type.get()) > bytes - offset) {

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "plugin/recordings/columns/chunk_filters.h"
+#include "plugin/recordings/columns/event_table.h"
 
 namespace efm {
 
@@ -101,17 +101,10 @@ class Hdf5File {
   std::uint64_t bytes_ = 0;
 };
 
-/// Consecutive rows of a data set in memory.
-struct RowBlock {
-  const std::uint8_t* data = nullptr;  ///< Of row `first`; valid until the next rows are read.
-  std::uint64_t first = 0;
-  std::uint64_t end = 0;  ///< The row behind the last one.
-};
-
 /// Reads a data set chunk by chunk. A row is the numbers, or the compound value, of one index of
 /// the first dimension, as the file stores them. Memory is that of a chunk. Known filters are
 /// undone here (see chunk_filters.h); others by the plugins of the HDF5 library.
-class Hdf5Rows {
+class Hdf5Rows : public NumberRows {
  public:
   /// @throws std::runtime_error naming the file and the data set if it does not exist, has no
   /// layout that can be read, a filter that is absent, or larger chunks than `kMaxChunkBytes`.
@@ -120,20 +113,22 @@ class Hdf5Rows {
   static constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 27;
 
   const std::string& path() const { return path_; }
-  std::uint64_t size() const { return size_; }
   /// The numbers of a row: the product of the other dimensions.
   std::size_t rowNumbers() const { return row_numbers_; }
-  std::size_t rowBytes() const { return row_numbers_ * element_bytes_; }
-  hid_t type() const { return type_.get(); }
-
-  /// The chunk that contains a row.
-  /// @param row below `size`.
-  const RowBlock& blockAt(std::uint64_t row);
-
+  std::string placeOf(std::uint64_t row) const override;
   std::runtime_error fail(std::string_view what) const { return file_->fail(path_, what); }
-  std::runtime_error failAt(std::uint64_t row, std::string_view what) const;
+
+  /// A number of each row: of a list, or of a matrix.
+  /// @param index of the number in the row of a matrix.
+  static RowColumn ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index);
+  /// A field of compound values.
+  /// @throws std::runtime_error naming the file, the data set and the field if there is no such
+  /// field, or it is no number.
+  static RowColumn ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field);
 
  private:
+  RowBlock readBlock(std::uint64_t row) override;
+  NumberType numberType(hid_t type) const;
   void readLayout();
   void readFilters(hid_t creation);
   void readChunks(std::uint64_t first_row);
@@ -149,97 +144,13 @@ class Hdf5Rows {
   std::vector<hsize_t> sides_;        // of the data set
   std::vector<hsize_t> chunk_sides_;  // of a chunk, or of a block of rows
   std::uint64_t chunk_bytes_ = 0;
-  std::uint64_t size_ = 0;
   std::size_t row_numbers_ = 1;
   bool direct_ = false;  // chunks are read without the library's filters
   std::vector<ChunkFilter> filters_;
 
-  RowBlock block_;
   std::vector<std::uint8_t> rows_;  // of the block
   std::vector<std::uint8_t> chunk_;
   std::vector<std::uint8_t> scratch_;
-};
-
-/// A number of each row: a data set of its own, a column of a matrix, or a field of a compound
-/// value.
-class Hdf5Column {
- public:
-  /// @param index of the number in the row of a matrix.
-  static Hdf5Column ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index);
-  /// @throws std::runtime_error naming the file, the data set and the field if there is no such
-  /// field, or it is no number.
-  static Hdf5Column ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field);
-
-  std::uint64_t size() const { return rows_->size(); }
-  /// Whether the numbers are float or double.
-  bool isReal() const { return type_ == Type::kFloat || type_ == Type::kDouble; }
-  Hdf5Rows& rows() const { return *rows_; }
-
-  /// Calls `take(i, number)` for the rows first + i, i from 0 to count - 1, up to the first one
-  /// for which it returns false. The number has the type of the file. The rows must lie in one
-  /// block.
-  /// @return the first i that was refused; `count` if none was.
-  template <typename Take>
-  std::size_t forEach(std::uint64_t first, std::size_t count, const Take& take) const {
-    switch (type_) {
-      case Type::kUint8:
-        return loop<std::uint8_t>(first, count, take);
-      case Type::kInt8:
-        return loop<std::int8_t>(first, count, take);
-      case Type::kUint16:
-        return loop<std::uint16_t>(first, count, take);
-      case Type::kInt16:
-        return loop<std::int16_t>(first, count, take);
-      case Type::kUint32:
-        return loop<std::uint32_t>(first, count, take);
-      case Type::kInt32:
-        return loop<std::int32_t>(first, count, take);
-      case Type::kUint64:
-        return loop<std::uint64_t>(first, count, take);
-      case Type::kInt64:
-        return loop<std::int64_t>(first, count, take);
-      case Type::kFloat:
-        return loop<float>(first, count, take);
-      case Type::kDouble:
-        break;
-    }
-    return loop<double>(first, count, take);
-  }
-
- private:
-  enum class Type {
-    kUint8,
-    kInt8,
-    kUint16,
-    kInt16,
-    kUint32,
-    kInt32,
-    kUint64,
-    kInt64,
-    kFloat,
-    kDouble
-  };
-
-  Hdf5Column(std::shared_ptr<Hdf5Rows> rows, std::size_t offset, Type type)
-      : rows_(std::move(rows)), offset_(offset), type_(type) {}
-  static Type typeOf(const Hdf5Rows& rows, hid_t type);
-
-  template <typename Number, typename Take>
-  std::size_t loop(std::uint64_t first, std::size_t count, const Take& take) const {
-    const std::size_t stride = rows_->rowBytes();
-    const RowBlock& block = rows_->blockAt(first);
-    const std::uint8_t* from = block.data + (first - block.first) * stride + offset_;
-    for (std::size_t i = 0; i < count; ++i, from += stride) {
-      Number number;
-      std::memcpy(&number, from, sizeof(Number));
-      if (!take(i, number)) return i;
-    }
-    return count;
-  }
-
-  std::shared_ptr<Hdf5Rows> rows_;
-  std::size_t offset_;
-  Type type_;
 };
 
 }  // namespace efm

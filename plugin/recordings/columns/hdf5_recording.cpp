@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -15,8 +16,9 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/columns/event_table.h"
 #include "plugin/recordings/columns/hdf5_crash_note.h"
-#include "plugin/recordings/columns/hdf5_events.h"
+#include "plugin/recordings/columns/hdf5_file.h"
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_columns.h"
@@ -25,6 +27,122 @@ namespace efm {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// How a data set stores its events in HDF5. A new one is a row of `hdf5Layouts`.
+/// Polarity 1 is on; 0 and -1 are off.
+struct Hdf5Layout {
+  std::string name;                  ///< Of the data sets that have it.
+  std::vector<std::string> cameras;  ///< Groups; those that exist, in this order.
+  /// The data set, in the group, whose rows are the events. Empty: a data set per column.
+  std::string events;
+  /// x, y, t and p: data sets in the group; the fields of compound rows; empty: the columns of a
+  /// matrix in this order.
+  std::array<std::string, 4> columns;
+  /// Of t. 0: it is not known. Real times have this unit only if it is seconds. An unknown unit is
+  /// found from the values (`findTimeUnit`).
+  std::int64_t time_unit_ns = 0;
+  std::string index;   ///< In the group: the first event of each millisecond of t. Or empty.
+  std::string offset;  ///< In the group: is added to t; a whole number of `time_unit_ns`. Or empty.
+  std::optional<CameraSize> size;  ///< Of the sensor, if all recordings have the same.
+
+  /// The data set by which a file with this layout is known.
+  std::string signature() const { return events.empty() ? columns[0] : events; }
+};
+
+const std::vector<Hdf5Layout>& hdf5Layouts() {
+  static const std::vector<Hdf5Layout> all = {
+      // TUM-VIE's sensors have 1280x720 pixels, DSEC's and VECtor's 640x480.
+      {"DSEC, TUM-VIE, VECtor",
+       {""},
+       "",
+       {"/events/x", "/events/y", "/events/t", "/events/p"},
+       kNanosecondsPerMicrosecond,
+       "/ms_to_idx",
+       "/t_offset",
+       std::nullopt},
+      {"E2VID",
+       {""},
+       "",
+       {"/events/xs", "/events/ys", "/events/ts", "/events/ps"},
+       0,
+       "",
+       "",
+       std::nullopt},
+      {"M3ED",
+       {"/prophesee/left", "/prophesee/right"},
+       "",
+       {"/x", "/y", "/t", "/p"},
+       kNanosecondsPerMicrosecond,
+       "/ms_map_idx",
+       "",
+       CameraSize{1280, 720}},
+      {"MVSEC",
+       {"/davis/left", "/davis/right"},
+       "/events",
+       {},
+       kNanosecondsPerSecond,
+       "",
+       "",
+       CameraSize{346, 260}},
+      {"Metavision",
+       {""},
+       "/CD/events",
+       {"x", "y", "t", "p"},
+       kNanosecondsPerMicrosecond,
+       "",
+       "",
+       std::nullopt},
+  };
+  return all;
+}
+
+/// The events of a camera. Real times are rounded to what they resolve (`nanoseconds`).
+/// @param camera one of the layout's groups.
+/// @param size of the sensor, if it is known.
+/// @param options the unit of times that the layout does not know.
+/// @throws std::runtime_error naming the file and the data set that is missing or wrong, or whose
+/// unit of time is not certain.
+std::unique_ptr<EventStream> openHdf5Events(const std::shared_ptr<const Hdf5File>& file,
+                                            const Hdf5Layout& layout, const std::string& camera,
+                                            std::optional<CameraSize> size,
+                                            const ReaderOptions& options) {
+  const auto rows_of = [&](const std::string& name) {
+    return std::make_shared<Hdf5Rows>(file, camera + name);
+  };
+  EventTable table;
+  table.name = file->path().string();
+  table.place = table.name + ":" + camera + layout.signature();
+  if (layout.events.empty()) table.place.resize(table.place.rfind('/'));
+  table.size = size;
+  const auto rows = layout.events.empty() ? nullptr : rows_of(layout.events);
+  RowColumn* const columns[] = {&table.x, &table.y, &table.t, &table.p};
+  for (std::size_t i = 0; i < layout.columns.size(); ++i) {
+    const std::string& column = layout.columns[i];
+    const auto of_column = rows ? rows : rows_of(column);
+    *columns[i] = rows && !column.empty() ? Hdf5Rows::ofField(rows, column)
+                                          : Hdf5Rows::ofMatrix(of_column, rows ? i : 0);
+    if (of_column->size() != table.x.rows->size()) {
+      throw of_column->fail(fmt::format("{} numbers: expected {}, as many as {}{} has",
+                                        of_column->size(), table.x.rows->size(), camera,
+                                        layout.columns[0]));
+    }
+    if (i == 2) table.times = table.name + ":" + of_column->path();
+  }
+  const bool has_unit = layout.time_unit_ns == kNanosecondsPerSecond ||
+                        (layout.time_unit_ns != 0 && !isReal(table.t.type));
+  if (has_unit) table.time_unit_ns = layout.time_unit_ns;
+  if (!layout.offset.empty() && file->has(camera + layout.offset)) {
+    const std::string path = camera + layout.offset;
+    const std::int64_t offset = file->integer(path);
+    const auto offset_ns = nanoseconds(offset, layout.time_unit_ns);
+    if (!offset_ns) throw file->fail(path, fmt::format("{}: expected a time", offset));
+    table.offset_ns = *offset_ns;
+  }
+  if (!layout.index.empty() && file->has(camera + layout.index)) {
+    table.index = Hdf5Rows::ofMatrix(rows_of(layout.index), 0);
+  }
+  return eventsOf(std::move(table), options);
+}
 
 /// Poses in HDF5: 4x4 matrices and their times.
 struct Hdf5Poses {
@@ -58,31 +176,24 @@ std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
                     "as many as {} has",
                     matrices->size(), matrices->rowNumbers(), times->size(), poses.times));
   }
-  const Hdf5Column time = Hdf5Column::ofMatrix(times, 0);
-  std::vector<Hdf5Column> numbers;
+  const RowColumn time = Hdf5Rows::ofMatrix(times, 0);
+  std::vector<RowColumn> numbers;
   for (std::size_t k = 0; k < kMatrixNumbers; ++k) {
-    numbers.push_back(Hdf5Column::ofMatrix(matrices, k));
+    numbers.push_back(Hdf5Rows::ofMatrix(matrices, k));
   }
   std::vector<StampedPose> read;
   for (std::uint64_t i = 0; i < times->size(); ++i) {
-    StampedPose pose;
-    time.forEach(i, 1, [&](std::size_t, auto number) {
+    time.from(i).forEach(1, [&](std::size_t, auto number) {
       const auto t_ns = nanoseconds(number, poses.time_unit_ns);
       if (!t_ns) throw times->failAt(i, fmt::format("{}: expected {}", number, kExpectedTime));
-      pose.t_ns = *t_ns;
+      read.push_back({*t_ns, {}});
       return true;
     });
     double rows[kMatrixNumbers];
-    for (std::size_t k = 0; k < kMatrixNumbers; ++k) {
-      numbers[k].forEach(i, 1, [&](std::size_t, auto number) {
-        rows[k] = static_cast<double>(number);
-        return true;
-      });
-    }
+    for (std::size_t k = 0; k < kMatrixNumbers; ++k) rows[k] = numbers[k].number(i);
     const std::optional<Rigid3> transform = transformOf(rows);
     if (!transform) throw matrices->failAt(i, fmt::format("expected {}", kExpectedRigid));
-    pose.T_world_rig = poses.inverse ? transform->inverse() : *transform;
-    read.push_back(pose);
+    read.back().T_world_rig = poses.inverse ? transform->inverse() : *transform;
   }
   return read;
 }

@@ -4,12 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "maps/io/npy_header.h"
+#include "plugin/recordings/columns/event_table.h"
 #include "plugin/recordings/streams/file_content.h"
 
 namespace efm {
@@ -28,9 +29,9 @@ struct NpyPart {
   bool transposed = false;
 };
 
-/// The numbers of a NumPy array in a file of its own (.npy) or a member of an archive (.npz), from
-/// front to back. Memory is that of a block.
-class NpyArray {
+/// The numbers of a NumPy array in a file of its own (.npy) or a member of an archive (.npz), which
+/// is read from front to back. Memory is that of a block.
+class NpyArray : public NumberRows {
  public:
   /// @param member of a .npz file, with its ".npy"; empty: the file is the array.
   /// @param part without it, an array of numbers in C order is expected.
@@ -40,51 +41,29 @@ class NpyArray {
   const NpyHeader& header() const { return header_; }
   /// Numbers per row: the product of all sizes but the first one, or the number of fields.
   std::size_t columns() const { return columns_.size(); }
-  std::uint64_t rows() const { return rows_; }
-  std::size_t rowBytes() const { return row_bytes_; }
-  /// Whether the numbers of a column are float or double.
-  bool isReal(std::size_t column = 0) const;
+  /// A column of an array; without such a column, which an empty array has not, any.
+  static RowColumn columnOf(std::shared_ptr<NpyArray> array, std::size_t column);
+  /// A number.
+  double number(std::uint64_t row, std::size_t column = 0);
 
-  /// Replaces the block by the next rows; fewer than `max_rows` only at the end.
-  /// @return the number of rows.
-  std::size_t readRows(std::size_t max_rows);
-  /// The first rows, which the next `readRows` reads again. Called before `readRows`.
-  /// @return the number of rows that are there, at most `max_rows`.
-  std::size_t sampleRows(std::size_t max_rows);
-  /// Continues at a row, of a file that is not compressed.
-  void seek(std::uint64_t row);
-  bool canSeek() const { return content_.seekableBytes() > 0; }
-  /// The number of the next row.
-  std::uint64_t position() const { return position_; }
-
-  /// A number of the block.
-  double number(std::size_t row, std::size_t column = 0) const;
-  /// The same as a whole number; nothing where it is none, or beyond 64 bits.
-  std::optional<std::int64_t> whole(std::size_t row, std::size_t column = 0) const;
-  /// The same as a time in nanoseconds; nothing where it is none, or beyond kEndOfTimeNs. Real
-  /// numbers are rounded to what they resolve (`nanoseconds`).
-  /// @param exponent of the unit: 10^exponent seconds.
-  std::optional<std::int64_t> time(std::size_t row, std::size_t column, int exponent) const;
-
+  bool canSeek() const override { return content_.seekableBytes() > 0; }
+  std::string placeOf(std::uint64_t row) const override;
   /// "poses.npz/t.npy".
   const std::string& name() const { return name_; }
-  std::runtime_error failure(std::uint64_t row, const std::string& what) const;
 
  private:
+  RowBlock readBlock(std::uint64_t row) override;
   void setColumns(const NpyPart& part);
   void skip(std::uint64_t bytes);
-  const char* at(std::size_t row, std::size_t column) const;
 
   FileContent content_;
   std::string name_;
   NpyHeader header_;
-  std::uint64_t rows_ = 1;
   std::vector<NpyField> columns_;
-  std::size_t row_bytes_ = 0;
   std::uint64_t begin_ = 0;  // byte of the first row
-  std::uint64_t position_ = 0;
-  std::string ahead_;  // bytes read behind the header
-  std::vector<char> block_;
+  std::uint64_t next_ = 0;   // the row behind the last block
+  std::string ahead_;        // bytes read behind the header
+  std::vector<char> bytes_;  // of the block
 };
 
 }  // namespace efm

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -17,8 +18,6 @@
 
 namespace efm {
 namespace {
-
-constexpr std::size_t kPoseBlockRows = 4096;
 
 Rigid3 poseFromVector(const std::array<double, 7>& v) {
   const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
@@ -36,7 +35,7 @@ Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
 }
 
 /// @param first the pose's first column.
-Rigid3 poseOf(const NpyArray& array, std::size_t row, std::size_t first) {
+Rigid3 poseOf(NpyArray& array, std::uint64_t row, std::size_t first) {
   if (array.columns() == 16) {
     Eigen::Matrix4d matrix;
     for (int k = 0; k < 16; ++k) {
@@ -61,8 +60,8 @@ std::string shapeOf(const NpyArray& array) {
 
 /// The arrays of a recording's poses; `times` is null where the poses begin with a time.
 struct PoseArrays {
-  std::unique_ptr<NpyArray> times;
-  std::unique_ptr<NpyArray> poses;
+  std::shared_ptr<NpyArray> times;
+  std::shared_ptr<NpyArray> poses;
 };
 
 bool hasPoseShape(const NpyArray& array, bool with_time) {
@@ -86,7 +85,7 @@ bool namesPoses(const std::string& member) {
 }
 
 /// The member that fits: the only one, or the one with a fitting name.
-std::unique_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
+std::shared_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
                                       std::vector<std::string> candidates, const char* what,
                                       bool (*has_name)(const std::string&),
                                       const std::string& all) {
@@ -95,7 +94,7 @@ std::unique_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
                                     [&](const std::string& name) { return !has_name(name); }),
                      candidates.end());
   }
-  if (candidates.size() == 1) return std::make_unique<NpyArray>(file, candidates.front());
+  if (candidates.size() == 1) return std::make_shared<NpyArray>(file, candidates.front());
   throw std::runtime_error(fmt::format(
       "{}: has {}: expected an array of N times, and one of N poses, N x 7 (tx ty tz qx "
       "qy qz qw) or N x 4 x 4; {} is not clear",
@@ -104,7 +103,7 @@ std::unique_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
 
 PoseArrays openPoseArrays(const std::filesystem::path& file) {
   if (!isCompressed(file)) {
-    auto poses = std::make_unique<NpyArray>(file);
+    auto poses = std::make_shared<NpyArray>(file);
     if (hasPoseShape(*poses, true)) return {nullptr, std::move(poses)};
     throw std::runtime_error(
         fmt::format("{}: shape {}: expected N rows of 8 numbers, t tx ty tz qx qy qz qw, or a .npz "
@@ -129,19 +128,23 @@ PoseArrays openPoseArrays(const std::filesystem::path& file) {
     all += (all.empty() ? "" : ", ") + member + " " + shape;
   }
   if (with_time.size() == 1) {
-    return {nullptr, std::make_unique<NpyArray>(file, with_time.front())};
+    return {nullptr, std::make_shared<NpyArray>(file, with_time.front())};
   }
   return {chooseArray(file, times, "the times", namesTimes, all),
           chooseArray(file, poses, "the poses", namesPoses, all)};
 }
 
-TimeSample timeSampleOf(const NpyArray& times, std::size_t rows) {
+/// The unit of the times that the array's name says, else that of the first ones.
+int timeExponentOf(const RowColumn& times, const std::string& name, const ReaderOptions& options) {
+  constexpr std::uint64_t kSample = 4096;
+  const auto exponent = headerWord(std::filesystem::path(name).stem().string()).time_exponent;
+  if (exponent) return *exponent;  // t_us.npy
   TimeSample sample;
-  for (std::size_t row = 0; row < rows; ++row) {
+  for (std::uint64_t row = 0; row < std::min(times.rows->size(), kSample); ++row) {
     const double t = times.number(row);
-    sample.add(t, !times.isReal() || std::floor(t) == t);
+    sample.add(t, !isReal(times.type) || std::floor(t) == t);
   }
-  return sample;
+  return sample.whole ? poseTimeExponent(options, sample, name) : 0;
 }
 
 }  // namespace
@@ -150,31 +153,25 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
                                         const ReaderOptions& options) {
   const PoseArrays arrays = openPoseArrays(file);
   NpyArray& poses = *arrays.poses;
-  NpyArray& times = arrays.times ? *arrays.times : poses;
-  if (times.rows() != poses.rows()) {
-    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", times.name(),
-                                         times.rows(), poses.rows(), poses.name()));
+  const std::shared_ptr<NpyArray> times_array = arrays.times ? arrays.times : arrays.poses;
+  if (times_array->size() != poses.size()) {
+    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", times_array->name(),
+                                         times_array->size(), poses.size(), poses.name()));
   }
-  const std::string times_name = std::filesystem::path(times.name()).stem().string();
-  std::optional<int> exponent = headerWord(times_name).time_exponent;  // t_us.npy
   std::vector<StampedPose> result;
-  while (const std::size_t rows = poses.readRows(kPoseBlockRows)) {
-    if (&times != &poses) times.readRows(kPoseBlockRows);
-    if (!exponent) {
-      const TimeSample sample = timeSampleOf(times, rows);
-      exponent = sample.whole ? poseTimeExponent(options, sample, times.name()) : 0;
+  if (poses.size() == 0) return result;
+  const RowColumn times = NpyArray::columnOf(times_array, 0);
+  const std::int64_t unit_ns = nanosecondsPer(timeExponentOf(times, times_array->name(), options));
+  for (std::uint64_t row = 0; row < poses.size(); ++row) {
+    const std::optional<std::int64_t> t_ns = times.time(row, unit_ns);
+    if (!t_ns) {
+      throw times_array->failAt(
+          row, fmt::format("t = {}: expected {}", times.number(row), kExpectedTime));
     }
-    for (std::size_t row = 0; row < rows; ++row) {
-      const std::optional<std::int64_t> t_ns = times.time(row, 0, *exponent);
-      if (!t_ns) {
-        throw times.failure(result.size(),
-                            fmt::format("t = {}: expected {}", times.number(row), kExpectedTime));
-      }
-      try {
-        result.push_back({*t_ns, poseOf(poses, row, arrays.times ? 0 : 1)});
-      } catch (const std::runtime_error& error) {
-        throw poses.failure(result.size(), error.what());
-      }
+    try {
+      result.push_back({*t_ns, poseOf(poses, row, arrays.times ? 0 : 1)});
+    } catch (const std::runtime_error& error) {
+      throw poses.failAt(row, error.what());
     }
   }
   return result;

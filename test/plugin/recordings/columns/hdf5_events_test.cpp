@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/columns/hdf5_events.h"
-
 #include <alloca.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -19,6 +17,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/columns/hdf5_crash_note.h"
+#include "plugin/recordings/columns/hdf5_file.h"
 #include "plugin/recordings/columns/hdf5_files.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/time_unit.h"
