@@ -18,7 +18,7 @@ namespace efm {
 /// A number from its bytes, on any machine.
 template <typename Number>
 Number numberFrom(const void* bytes, bool big_endian) {
-  static_assert(std::is_arithmetic_v<Number>);
+  static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
   std::array<char, sizeof(Number)> ordered;
   std::memcpy(ordered.data(), bytes, sizeof(Number));
   constexpr bool kBigEndianMachine = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;

@@ -58,6 +58,12 @@ inline std::string_view withoutByteOrderMark(std::string_view text) {
 /// The text without blanks at both ends.
 std::string_view trimmed(std::string_view text);
 
+/// Takes the first line from a text: the line, without its line break.
+std::string_view takeLine(std::string_view& text);
+
+/// The parts of a line between separators, trimmed. Behind a separator at the end is none.
+std::vector<std::string_view> splitFields(std::string_view line, std::string_view separators);
+
 /// The words of a text, which blanks separate. They are views of the text.
 std::vector<std::string_view> splitWords(std::string_view text,
                                          std::string_view blanks = kLineBlanks);

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <vector>
+#include <utility>
 
 #include "mapping/base/text.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
@@ -136,28 +136,28 @@ CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize siz
     throw std::runtime_error(fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3",
                                          file.string(), numbers.size()));
   }
-  CameraModel model;
+  CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
+                                 {numbers.begin() + 4, numbers.end()});
   model.width = size.width;
   model.height = size.height;
-  model.fx = numbers[0];
-  model.fy = numbers[1];
-  model.cx = numbers[2];
-  model.cy = numbers[3];
-  model.distortion = DistortionModel::kRadtan;
-  model.coefficients.assign(numbers.begin() + 4, numbers.end());
-  try {
-    model.validate();
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
   return model;
 }
 
 Calibration readUzhCalibration(const std::filesystem::path& file) {
-  CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
-  model.width = 0;
-  model.height = 0;
-  return {file, {{{model, {}, 0}}}};
+  return {file, {{{readUzhCalibration(file, {0, 0}), {}, 0}}}};
+}
+
+CameraModel radtanLens(const std::filesystem::path& file, const std::vector<double>& k,
+                       std::vector<double> coefficients) {
+  CameraModel model{1, 1, k[0], k[1], k[2], k[3], DistortionModel::kRadtan, {}};
+  model.coefficients = std::move(coefficients);
+  try {
+    model.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+  model.width = model.height = 0;
+  return model;
 }
 
 Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration) {

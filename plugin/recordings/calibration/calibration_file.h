@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/rigid3.h"
@@ -62,6 +63,12 @@ Calibration readCalibration(const std::filesystem::path& file);
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
 /// The same without the sensor's size, which the file does not have: width and height are 0.
 Calibration readUzhCalibration(const std::filesystem::path& file);
+
+/// A radtan lens without the sensor's size, which is not in the file.
+/// @param k fx fy cx cy.
+/// @throws std::runtime_error naming the file, where `CameraModel::validate` refuses the lens.
+CameraModel radtanLens(const std::filesystem::path& file, const std::vector<double>& k,
+                       std::vector<double> coefficients);
 
 /// Reads the rig's pose on the tracked body, whose poses a recording has:
 ///   T_world_rig = T_world_body * T_body_rig.

@@ -103,21 +103,15 @@ CameraModel readCameraInfo(const YamlEntry& root) {
   if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
     throw matrix.failKey("data", "a matrix with skew or another last row", kForm);
   }
-  CameraModel model;
-  model.fx = k[0];
-  model.cx = k[2];
-  model.fy = k[4];
-  model.cy = k[5];
+  CameraModel model{0, 0, k[0], k[4], k[2], k[5], DistortionModel::kRadtan, {}};
   const double width = root.number("image_width");
   setSensorSize(root, "image_width", width, 1, model);
   setSensorSize(root, "image_height", width, root.number("image_height"), model);
 
   const std::string distortion = root.text("distortion_model");
-  if (distortion == "plumb_bob") {
-    model.distortion = DistortionModel::kRadtan;
-  } else if (distortion == "equidistant" || distortion == "fisheye") {
+  if (distortion == "equidistant" || distortion == "fisheye") {
     model.distortion = DistortionModel::kEquidistant;
-  } else {
+  } else if (distortion != "plumb_bob") {
     throw root.failKey("distortion_model", inQuotes(distortion),
                        "plumb_bob, equidistant or fisheye");
   }
@@ -170,16 +164,21 @@ Rigid3 jsonPose(const YamlEntry& pose) {
   return {rotation.normalized(), {pose.number("px"), pose.number("py"), pose.number("pz")}};
 }
 
+CameraModel pinholeOf(const YamlEntry& entry) {
+  CameraModel model;
+  model.fx = entry.number("fx");
+  model.fy = entry.number("fy");
+  model.cx = entry.number("cx");
+  model.cy = entry.number("cy");
+  return model;
+}
+
 CameraModel kb4Camera(const YamlEntry& value, std::size_t index, const Eigen::MatrixXd& sizes) {
   const YamlEntry camera = value.item("intrinsics", index);
   const std::string type = camera.text("camera_type");
   if (type != "kb4") throw camera.failKey("camera_type", inQuotes(type), "kb4");
   const YamlEntry numbers = camera.section("intrinsics");
-  CameraModel model;
-  model.fx = numbers.number("fx");
-  model.fy = numbers.number("fy");
-  model.cx = numbers.number("cx");
-  model.cy = numbers.number("cy");
+  CameraModel model = pinholeOf(numbers);
   model.distortion = DistortionModel::kEquidistant;
   for (const char* key : {"k1", "k2", "k3", "k4"}) {
     model.coefficients.push_back(numbers.number(key));
@@ -234,13 +233,6 @@ std::string_view iniContent(std::string_view line) {
   return trimmed(line);
 }
 
-std::string_view takeIniLine(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = iniContent(text.substr(0, end));
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
-}
-
 bool isSection(std::string_view line) {
   return line.size() > 2 && line.front() == '[' && line.back() == ']' &&
          line.find_first_of(", ") == std::string_view::npos;
@@ -264,7 +256,7 @@ std::map<std::string, YAML::Node> iniSections(std::string_view text,
   std::map<std::string, YAML::Node> sections;
   std::string section;
   for (int number = 1; !text.empty(); ++number) {
-    const std::string_view line = takeIniLine(text);
+    const std::string_view line = iniContent(takeLine(text));
     if (line.empty()) continue;
     if (isSection(line)) {
       section = std::string(line.substr(1, line.size() - 2));
@@ -283,11 +275,7 @@ std::map<std::string, YAML::Node> iniSections(std::string_view text,
 }
 
 CameraModel mrptCamera(const YamlEntry& entry) {
-  CameraModel model;
-  model.fx = entry.number("fx");
-  model.fy = entry.number("fy");
-  model.cx = entry.number("cx");
-  model.cy = entry.number("cy");
+  CameraModel model = pinholeOf(entry);
   const std::vector<double> size = entry.numbers("resolution", 2, "2, width height");
   setSensorSize(entry, "resolution", size[0], size[1], model);
 
@@ -325,7 +313,7 @@ Rigid3 mrptPose(const YamlEntry& entry) {
 
 bool looksLikeIni(std::string_view text) {
   while (!text.empty()) {
-    const std::string_view line = takeIniLine(text);
+    const std::string_view line = iniContent(takeLine(text));
     if (!line.empty()) return isSection(line);
   }
   return false;

@@ -154,12 +154,8 @@ CameraModel readKalibrCamera(const YamlEntry& entry, const char* intrinsics_key)
   const std::string kind = entry.text("camera_model");
   if (kind != "pinhole") throw entry.failKey("camera_model", inQuotes(kind), "pinhole");
 
-  CameraModel model;
-  const std::vector<double> intrinsics = entry.numbers(intrinsics_key, 4, "4, fx fy cx cy");
-  model.fx = intrinsics[0];
-  model.fy = intrinsics[1];
-  model.cx = intrinsics[2];
-  model.cy = intrinsics[3];
+  const std::vector<double> k = entry.numbers(intrinsics_key, 4, "4, fx fy cx cy");
+  CameraModel model{0, 0, k[0], k[1], k[2], k[3], DistortionModel::kNone, {}};
   const std::vector<double> resolution = entry.numbers("resolution", 2, "2, width height");
   setSensorSize(entry, "resolution", resolution[0], resolution[1], model);
   const std::string distortion = entry.text("distortion_model");

@@ -74,24 +74,16 @@ std::optional<EventNames> namesOf(const std::vector<std::string>& all,
     return std::find(all.begin(), all.end(), name) != all.end();
   };
   if (const auto names = eventNamesOf(options.columns)) {
-    const bool complete = has(names->t) && has(names->x) && has(names->y) && has(names->p);
-    return complete ? names : std::nullopt;
+    return std::all_of(names->begin(), names->end(), has) ? names : std::nullopt;
   }
   EventNames names;
   for (const std::string& name : all) {
-    const char column = eventColumnOf(headerWord(name));
-    std::string* const found = column == 't'   ? &names.t
-                               : column == 'x' ? &names.x
-                               : column == 'y' ? &names.y
-                               : column == 'p' ? &names.p
-                                               : nullptr;
-    if (found == nullptr) continue;
-    if (!found->empty()) return std::nullopt;
-    *found = name;
+    const std::size_t column = kEventColumns.find(eventColumnOf(headerWord(name)));
+    if (column == std::string_view::npos) continue;
+    if (!names[column].empty()) return std::nullopt;
+    names[column] = name;
   }
-  const bool complete =
-      !names.t.empty() && !names.x.empty() && !names.y.empty() && !names.p.empty();
-  return complete ? std::optional(names) : std::nullopt;
+  return hasAll(names) ? std::optional(names) : std::nullopt;
 }
 
 /// The position of a name among all.
@@ -141,11 +133,8 @@ bool isMetavision(const std::vector<NpyField>& fields) {
 template <typename ColumnNamed>
 EventTable tableOf(const EventNames& names, const ColumnNamed& column) {
   EventTable table;
-  table.t = column(names.t);
-  table.x = column(names.x);
-  table.y = column(names.y);
-  table.p = column(names.p);
-  const std::optional<int> exponent = headerWord(names.t).time_exponent;
+  std::transform(names.begin(), names.end(), table.columns.begin(), column);
+  const std::optional<int> exponent = headerWord(names.front()).time_exponent;
   if (exponent) table.time_unit_ns = nanosecondsPer(*exponent);
   return table;
 }
@@ -184,10 +173,7 @@ EventTable matrixColumnsOf(const fs::path& file, const FoundArray& found,
   }
   EventTable table;
   const std::string order = findColumnOrder(rows, options, file.string(), table.warnings);
-  table.t = all[order.find('t')];
-  table.x = all[order.find('x')];
-  table.y = all[order.find('y')];
-  table.p = all[order.find('p')];
+  for (const char column : kEventColumns) table.column(column) = all[order.find(column)];
   return table;
 }
 
@@ -241,13 +227,13 @@ std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptio
   const auto array_of = [](const RowColumn& column) -> const NpyArray& {
     return static_cast<const NpyArray&>(*column.rows);
   };
-  const std::uint64_t rows = table.t.rows->size();
-  table.name = table.times = array_of(table.t).name();
-  for (const RowColumn* column : {&table.x, &table.y, &table.p}) {
-    if (column->rows->size() == rows) continue;
-    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has",
-                                         array_of(*column).name(), column->rows->size(), rows,
-                                         table.name));
+  const NpyArray& times = array_of(table.column('t'));
+  table.name = table.times = times.name();
+  for (const RowColumn& column : table.columns) {
+    const NpyArray& array = array_of(column);
+    if (array.size() == times.size()) continue;
+    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", array.name(),
+                                         array.size(), times.size(), times.name()));
   }
   table.seek_margin_ns = kMaxEventDelayNs;
   return eventsOf(std::move(table), options);
@@ -263,10 +249,7 @@ bool looksLikeNumpy(const fs::path& file) {
                return fs::path(member).extension() == ".npy";
              });
     }
-    std::string bytes(8, '\0');
-    FileContent content(file);
-    bytes.resize(content.read(bytes.data(), bytes.size()));
-    return looksLikeNpy(bytes);
+    return looksLikeNpy(firstContentOf(file, 8));
   } catch (const std::exception&) {
     return false;
   }

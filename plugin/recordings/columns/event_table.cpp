@@ -25,7 +25,7 @@ struct RefusedNumber {
 class TableEvents : public EventStream {
  public:
   TableEvents(EventTable table, const ReaderOptions& options)
-      : table_(std::move(table)), count_(table_.t.rows->size()) {
+      : table_(std::move(table)), count_(table_.column('t').rows->size()) {
     if (!table_.time_unit_ns) findUnit(options);
   }
 
@@ -45,7 +45,7 @@ class TableEvents : public EventStream {
     }
     t_ns -= table_.seek_margin_ns;
     const auto is_early = [&](std::uint64_t event) {
-      const std::optional<std::int64_t> event_ns = table_.t.time(event, *table_.time_unit_ns);
+      const std::optional<std::int64_t> event_ns = column('t').time(event, *table_.time_unit_ns);
       if (event_ns) return *event_ns + table_.offset_ns < t_ns;
       if (table_.place.empty()) return false;  // `read` reports it
       throw std::runtime_error(placeOf(event, 't') + ": t: expected " + kExpectedTime);
@@ -80,12 +80,7 @@ class TableEvents : public EventStream {
  private:
   /// Of the wrong numbers of an event, the first one in this order is reported.
   std::string_view order() const { return table_.place.empty() ? "tpxy" : "xytp"; }
-  const RowColumn& column(char letter) const {
-    return letter == 't'   ? table_.t
-           : letter == 'x' ? table_.x
-           : letter == 'y' ? table_.y
-                           : table_.p;
-  }
+  const RowColumn& column(char letter) const { return table_.columns[kEventColumns.find(letter)]; }
   std::string placeOf(std::uint64_t event, char letter) const {
     return table_.place.empty() ? column(letter).rows->placeOf(event)
                                 : fmt::format("{}[{}]", table_.place, event);
@@ -93,7 +88,8 @@ class TableEvents : public EventStream {
   /// Finds the unit from the times of the first block.
   void findUnit(const ReaderOptions& options) {
     TimeSample sample;
-    for (std::size_t row = 0; row < sampledRows(table_.t); ++row) sample.add(table_.t.number(row));
+    const RowColumn& t = column('t');
+    for (std::size_t row = 0; row < sampledRows(t); ++row) sample.add(t.number(row));
     TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, table_.times);
     table_.time_unit_ns = nanosecondsPer(unit.exponent);
     if (unit.warning) table_.warnings.push_back(std::move(*unit.warning));

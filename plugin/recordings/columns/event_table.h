@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "mapping/base/number_bytes.h"
 #include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
+#include "plugin/recordings/text/event_columns.h"
 
 namespace efm {
 
@@ -74,8 +76,8 @@ struct RowColumn {
 
 /// The events of a camera in columns of numbers: polarity 1 is on; 0 and -1 are off.
 struct EventTable {
-  RowColumn t, x, y, p;
-  std::string name;  ///< Of the file, or of the array of the times.
+  std::array<RowColumn, 4> columns;  ///< In the order of `kEventColumns`.
+  std::string name;                  ///< Of the file, or of the array of the times.
   /// Errors name event i as PLACE[i]. Empty: by the row of the column that is wrong.
   std::string place;
   std::string times;  ///< The name of the times, for the error of an unknown unit.
@@ -86,6 +88,8 @@ struct EventTable {
   bool inverted = false;                     ///< Polarity 0 is on.
   std::optional<CameraSize> size;            ///< Of the sensor, if it is known.
   std::vector<Warning> warnings;             ///< About the columns.
+
+  RowColumn& column(char letter) { return columns[kEventColumns.find(letter)]; }
 };
 
 /// Reads block by block. Rows that can seek are sought by the index and by bisection.

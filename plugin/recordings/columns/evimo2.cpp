@@ -55,23 +55,7 @@ std::vector<double> numbersOf(NpyArray array, std::size_t max_count) {
 CameraModel modelOf(const fs::path& info) {
   const std::vector<double> k = numbersOf(NpyArray(info, "K.npy"), 9);
   if (k.size() != 9) throw std::runtime_error(info.string() + "/K.npy: expected 3 x 3 numbers");
-  CameraModel model;
-  model.width = kEvimo2Size.width;
-  model.height = kEvimo2Size.height;
-  model.fx = k[0];
-  model.cx = k[2];
-  model.fy = k[4];
-  model.cy = k[5];
-  model.distortion = DistortionModel::kRadtan;
-  model.coefficients = numbersOf(NpyArray(info, "D.npy"), 5);
-  try {
-    model.validate();
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}: {}", info.string(), error.what()));
-  }
-  model.width = 0;
-  model.height = 0;
-  return model;
+  return radtanLens(info, {k[0], k[4], k[2], k[5]}, numbersOf(NpyArray(info, "D.npy"), 5));
 }
 
 std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOptions& options) {
@@ -88,11 +72,9 @@ std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOption
   require_shape(*xy, 2);
   require_shape(*p, 1);
   EventTable table;
-  table.t = NpyArray::columnOf(t, 0);
-  table.x = NpyArray::columnOf(xy, 0);
-  table.y = NpyArray::columnOf(xy, 1);
-  table.p = NpyArray::columnOf(p, 0);
-  if (isReal(table.t.type)) table.time_unit_ns = kNanosecondsPerSecond;
+  table.columns = {NpyArray::columnOf(t, 0), NpyArray::columnOf(xy, 0), NpyArray::columnOf(xy, 1),
+                   NpyArray::columnOf(p, 0)};
+  if (isReal(table.column('t').type)) table.time_unit_ns = kNanosecondsPerSecond;
   table.inverted = isSamsung(folder);
   table.size = sizeOfDepth(folder);
   return openArrayEvents(std::move(table), options);

@@ -89,12 +89,8 @@ Hdf5Id Hdf5File::dataset(const std::string& path) const {
 
 std::vector<double> Hdf5File::numbers(const std::string& path, std::size_t count,
                                       std::string_view expected) const {
-  const Hdf5Quiet quiet;
-  const Hdf5Id set = dataset(path);
-  const Hdf5Id space(H5Dget_space(set.get()), H5Sclose);
   std::vector<double> values(count);
-  if (H5Sget_simple_extent_npoints(space.get()) != static_cast<hssize_t>(count) ||
-      H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+  if (!readAll(path, H5T_NATIVE_DOUBLE, count, values.data())) {
     throw fail(path, fmt::format("expected {} numbers, {}", count, expected));
   }
   for (const double value : values) {
@@ -104,16 +100,21 @@ std::vector<double> Hdf5File::numbers(const std::string& path, std::size_t count
 }
 
 std::int64_t Hdf5File::integer(const std::string& path) const {
+  std::int64_t value = 0;
+  if (!readAll(path, H5T_NATIVE_INT64, 1, &value)) throw fail(path, "expected a whole number");
+  return value;
+}
+
+/// Reads a data set with this count of numbers; whole ones, if `type` is.
+/// @return whether it could be read.
+bool Hdf5File::readAll(const std::string& path, hid_t type, std::size_t count, void* to) const {
   const Hdf5Quiet quiet;
   const Hdf5Id set = dataset(path);
   const Hdf5Id space(H5Dget_space(set.get()), H5Sclose);
-  const Hdf5Id type(H5Dget_type(set.get()), H5Tclose);
-  std::int64_t value = 0;
-  if (H5Tget_class(type.get()) != H5T_INTEGER || H5Sget_simple_extent_npoints(space.get()) != 1 ||
-      H5Dread(set.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
-    throw fail(path, "expected a whole number");
-  }
-  return value;
+  const Hdf5Id stored(H5Dget_type(set.get()), H5Tclose);
+  return (H5Tget_class(type) != H5T_INTEGER || H5Tget_class(stored.get()) == H5T_INTEGER) &&
+         H5Sget_simple_extent_npoints(space.get()) == static_cast<hssize_t>(count) &&
+         H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to) >= 0;
 }
 
 std::string Hdf5File::text(const std::string& path) const {

@@ -96,6 +96,8 @@ class Hdf5File {
   std::runtime_error fail(const std::string& path, std::string_view what) const;
 
  private:
+  bool readAll(const std::string& path, hid_t type, std::size_t count, void* to) const;
+
   std::filesystem::path path_;
   Hdf5Id id_;
   std::uint64_t bytes_ = 0;

@@ -28,6 +28,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The order of the columns in the layouts, and in the rows of a matrix.
+constexpr std::string_view kHdf5Columns = "xytp";
+
 /// How a data set stores its events in HDF5. A new one is a row of `hdf5Layouts`.
 /// Polarity 1 is on; 0 and -1 are off.
 struct Hdf5Layout {
@@ -41,9 +44,10 @@ struct Hdf5Layout {
   /// Of t. 0: it is not known. Real times have this unit only if it is seconds. An unknown unit is
   /// found from the values (`findTimeUnit`).
   std::int64_t time_unit_ns = 0;
-  std::string index;   ///< In the group: the first event of each millisecond of t. Or empty.
-  std::string offset;  ///< In the group: is added to t; a whole number of `time_unit_ns`. Or empty.
-  std::optional<CameraSize> size;  ///< Of the sensor, if all recordings have the same.
+  std::string index{};  ///< In the group: the first event of each millisecond of t. Or empty.
+  std::string
+      offset{};  ///< In the group: is added to t; a whole number of `time_unit_ns`. Or empty.
+  std::optional<CameraSize> size{};  ///< Of the sensor, if all recordings have the same.
 
   /// The data set by which a file with this layout is known.
   std::string signature() const { return events.empty() ? columns[0] : events; }
@@ -58,16 +62,8 @@ const std::vector<Hdf5Layout>& hdf5Layouts() {
        {"/events/x", "/events/y", "/events/t", "/events/p"},
        kNanosecondsPerMicrosecond,
        "/ms_to_idx",
-       "/t_offset",
-       std::nullopt},
-      {"E2VID",
-       {""},
-       "",
-       {"/events/xs", "/events/ys", "/events/ts", "/events/ps"},
-       0,
-       "",
-       "",
-       std::nullopt},
+       "/t_offset"},
+      {"E2VID", {""}, "", {"/events/xs", "/events/ys", "/events/ts", "/events/ps"}},
       {"M3ED",
        {"/prophesee/left", "/prophesee/right"},
        "",
@@ -84,14 +80,7 @@ const std::vector<Hdf5Layout>& hdf5Layouts() {
        "",
        "",
        CameraSize{346, 260}},
-      {"Metavision",
-       {""},
-       "/CD/events",
-       {"x", "y", "t", "p"},
-       kNanosecondsPerMicrosecond,
-       "",
-       "",
-       std::nullopt},
+      {"Metavision", {""}, "/CD/events", {"x", "y", "t", "p"}, kNanosecondsPerMicrosecond},
   };
   return all;
 }
@@ -115,21 +104,21 @@ std::unique_ptr<EventStream> openHdf5Events(const std::shared_ptr<const Hdf5File
   if (layout.events.empty()) table.place.resize(table.place.rfind('/'));
   table.size = size;
   const auto rows = layout.events.empty() ? nullptr : rows_of(layout.events);
-  RowColumn* const columns[] = {&table.x, &table.y, &table.t, &table.p};
   for (std::size_t i = 0; i < layout.columns.size(); ++i) {
     const std::string& column = layout.columns[i];
     const auto of_column = rows ? rows : rows_of(column);
-    *columns[i] = rows && !column.empty() ? Hdf5Rows::ofField(rows, column)
-                                          : Hdf5Rows::ofMatrix(of_column, rows ? i : 0);
-    if (of_column->size() != table.x.rows->size()) {
+    table.column(kHdf5Columns[i]) = rows && !column.empty()
+                                        ? Hdf5Rows::ofField(rows, column)
+                                        : Hdf5Rows::ofMatrix(of_column, rows ? i : 0);
+    if (of_column->size() != table.column('x').rows->size()) {
       throw of_column->fail(fmt::format("{} numbers: expected {}, as many as {}{} has",
-                                        of_column->size(), table.x.rows->size(), camera,
+                                        of_column->size(), table.column('x').rows->size(), camera,
                                         layout.columns[0]));
     }
-    if (i == 2) table.times = table.name + ":" + of_column->path();
+    if (kHdf5Columns[i] == 't') table.times = table.name + ":" + of_column->path();
   }
   const bool has_unit = layout.time_unit_ns == kNanosecondsPerSecond ||
-                        (layout.time_unit_ns != 0 && !isReal(table.t.type));
+                        (layout.time_unit_ns != 0 && !isReal(table.column('t').type));
   if (has_unit) table.time_unit_ns = layout.time_unit_ns;
   if (!layout.offset.empty() && file->has(camera + layout.offset)) {
     const std::string path = camera + layout.offset;
@@ -209,13 +198,10 @@ RigCamera readCalib(const Hdf5File& file, const std::string& group) {
                       fmt::format("{}: expected whole numbers from 1 to 65535", side));
     }
   }
-  model.width = static_cast<int>(resolution[0]);
-  model.height = static_cast<int>(resolution[1]);
-  const std::vector<double> intrinsics = file.numbers(group + "/intrinsics", 4, "fx fy cx cy");
-  model.fx = intrinsics[0];
-  model.fy = intrinsics[1];
-  model.cx = intrinsics[2];
-  model.cy = intrinsics[3];
+  const auto width = static_cast<int>(resolution[0]);
+  const auto height = static_cast<int>(resolution[1]);
+  const std::vector<double> k = file.numbers(group + "/intrinsics", 4, "fx fy cx cy");
+  model = {width, height, k[0], k[1], k[2], k[3], DistortionModel::kNone, {}};
   const std::string distortion = file.text(group + "/distortion_model");
   try {
     model.distortion = distortionModelFromName(distortion);
@@ -271,10 +257,10 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
 
 /// The layout of the data sets, or of the fields of a compound data set, with given names.
 Hdf5Layout namedLayout(const Hdf5File& file, const EventNames& names) {
-  Hdf5Layout layout = {"--event-columns", {""}, "", {}, 0, "", "", std::nullopt};
-  const std::string* const all[] = {&names.x, &names.y, &names.t, &names.p};
+  Hdf5Layout layout = {"--event-columns", {""}, "", {}};
   for (std::size_t i = 0; i < layout.columns.size(); ++i) {
-    layout.columns[i] = (all[i]->front() == '/' ? "" : "/") + *all[i];
+    const std::string& name = names[kEventColumns.find(kHdf5Columns[i])];
+    layout.columns[i] = (name.front() == '/' ? "" : "/") + name;
   }
   const std::string parent = fs::path(layout.columns[0]).parent_path().string();
   if (file.has(layout.columns[0]) || !file.has(parent)) return layout;
@@ -294,7 +280,7 @@ bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions&
   if (names) {
     const Hdf5Layout layout = namedLayout(*file, *names);
     ReaderOptions named = options;
-    const auto exponent = headerWord(fs::path(names->t).filename().string()).time_exponent;
+    const auto exponent = headerWord(fs::path(names->front()).filename().string()).time_exponent;
     if (named.time_unit.empty() && exponent) named.time_unit = timeUnitOf(*exponent);
     if (addCameras(file, layout, named, parts)) return true;
   }
@@ -302,7 +288,7 @@ bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions&
   for (const Hdf5Layout& layout : hdf5Layouts()) {
     any = addCameras(file, layout, options, parts) || any;
   }
-  if (any && names) throw file->fail("/" + names->x, "no such data set (--event-columns)");
+  if (any && names) throw file->fail("/" + (*names)[1], "no such data set (--event-columns)");
   return any;
 }
 

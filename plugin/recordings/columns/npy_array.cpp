@@ -27,10 +27,7 @@ NpyHeader parseHeader(const std::string& bytes, const std::string& name) {
 }  // namespace
 
 NpyHeader readNpyHeader(const std::filesystem::path& file, const std::string& member) {
-  FileContent content(file, member);
-  std::string bytes(kHeaderBytes, '\0');
-  bytes.resize(content.read(bytes.data(), kHeaderBytes));
-  return parseHeader(bytes, nameOf(file, member));
+  return parseHeader(firstContentOf(file, kHeaderBytes, member), nameOf(file, member));
 }
 
 NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member,

@@ -127,29 +127,10 @@ std::optional<std::string> nameIn(const UnreadFormat (&table)[N], const std::str
   return std::nullopt;
 }
 
-std::string rawBeginning(const fs::path& file) {
-  std::string bytes(kBeginning, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
-}
-
-/// Of the only file in a compressed one; empty where there are several.
-std::string unpackedBeginning(const fs::path& file) {
-  std::string bytes(kBeginning, '\0');
-  FileContent content(file);
-  bytes.resize(content.read(bytes.data(), bytes.size()));
-  return bytes;
-}
-
 /// Whether a file is the report.json of a run.
 bool isReport(const fs::path& file) {
   constexpr std::size_t kMostBytes = 1 << 20;
-  std::string text(kMostBytes, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
+  const std::string text = firstBytesOf(file, kMostBytes);
   return text.compare(0, 1, "{") == 0 && text.find("\"votes_per_second\"") != std::string::npos;
 }
 
@@ -162,7 +143,7 @@ const char* ownResult(const fs::path& source) {
     return "the result of a run that was killed, or is not at its end yet";
   }
   if (!isFile(source)) return nullptr;
-  const std::string bytes = rawBeginning(source);
+  const std::string bytes = firstBytesOf(source, kBeginning);
   if (bytes.find("name=\"generator\" content=\"event-fusion\"") != std::string::npos) {
     return "the page of a map";
   }
@@ -170,7 +151,7 @@ const char* ownResult(const fs::path& source) {
 }
 
 std::optional<std::string> unreadFile(const fs::path& file) {
-  const std::string bytes = rawBeginning(file);
+  const std::string bytes = firstBytesOf(file, kBeginning);
   if (bytes.empty()) return fmt::format("an empty file: {}", kIncomplete);
   if (bytes.size() == kBeginning && bytes.find_first_not_of('\0') == std::string::npos) {
     return fmt::format("a file of zeros: {}", kIncomplete);
@@ -181,7 +162,7 @@ std::optional<std::string> unreadFile(const fs::path& file) {
   }
   if (isCompressed(file)) {
     try {
-      const std::string content = unpackedBeginning(file);
+      const std::string content = firstContentOf(file, kBeginning);
       if (auto name = nameIn(kReadUnpacked, content)) return name;
       if (auto name = nameIn(kUnreadFormats, content)) return name;
     } catch (const std::exception&) {  // several files, or a damaged one
@@ -239,15 +220,6 @@ bool beginsAnObject(std::string_view bytes) {
   return std::all_of(name.begin(), name.end(), isNameCharacter);
 }
 
-/// The first bytes of the content; nothing of what cannot be read.
-std::string firstBytes(const fs::path& file) {
-  constexpr std::size_t kBytes = 4096;
-  std::string bytes(kBytes, '\0');
-  FileContent content(file);
-  bytes.resize(content.read(bytes.data(), kBytes));
-  return bytes;
-}
-
 void refuseUnread(const fs::path& file) {
   if (isCompressed(file) || fs::is_directory(file)) return;
   if (const auto unread = unreadFormat(file)) {
@@ -275,7 +247,7 @@ std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions&
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
   if (looksLikeNumpy(file)) return readPoseArrays(file, options);
-  const std::string start = firstBytes(file);
+  const std::string start = firstContentOf(file, 4096);
   requireTextLines(start, file.string());
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
@@ -372,10 +344,7 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source) {
 }
 
 std::vector<StampedPose> readPoses(const fs::path& file, const ReaderOptions& options) {
-  std::vector<StampedPose> poses = readAnyPoses(file, options);
-  if (!poses.empty()) return poses;
-  throw std::runtime_error(file.string() +
-                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
+  return requirePoses(readAnyPoses(file, options), file);
 }
 
 }  // namespace efm

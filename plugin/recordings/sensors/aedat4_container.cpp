@@ -7,12 +7,13 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <new>
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"
+#include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
 namespace {
@@ -76,9 +77,7 @@ class FlatTable {
   template <typename Number>
   Number valueAt(std::uint64_t position) const {
     require(position, sizeof(Number));
-    Number value;  // the host is little-endian, like the file
-    std::memcpy(&value, bytes_ + position, sizeof(Number));
-    return value;
+    return numberFrom<Number>(bytes_ + position, false);
   }
   std::string_view textAt(std::uint64_t position, std::uint64_t count) const {
     require(position, count);
@@ -142,12 +141,7 @@ std::vector<Aedat4StreamInfo> streamsOf(std::string_view xml) {
     const tinyxml2::XMLElement* const info = xmlChild(node, "node", "name", "info");
     Aedat4StreamInfo stream{*id, xmlAttribute(node, "originalOutputName"),
                             xmlAttribute(info, "source"), std::nullopt};
-    const auto width = parseNumber<int>(xmlAttribute(info, "sizeX"));
-    const auto height = parseNumber<int>(xmlAttribute(info, "sizeY"));
-    constexpr int kMaxSide = 65'535;
-    if (width && height && std::min(*width, *height) > 0 && std::max(*width, *height) <= kMaxSide) {
-      stream.size = CameraSize{*width, *height};
-    }
+    stream.size = cameraSizeOf(xmlAttribute(info, "sizeX"), xmlAttribute(info, "sizeY"));
     streams.push_back(std::move(stream));
   }
   std::sort(streams.begin(), streams.end(),
@@ -239,8 +233,7 @@ Aedat4Header readAedat4Header(const std::filesystem::path& file) {
     throw fail(0, "expected '#!AER-DAT4.0'");
   }
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  std::uint32_t size = 0;
-  std::memcpy(&size, bytes.data(), sizeof(size));
+  const auto size = numberFrom<std::uint32_t>(bytes.data(), false);
   const std::uint64_t begin = magic.size() + bytes.size();
   const std::uint64_t left = header.file_size - std::min(begin, header.file_size);
   if (!stream || size > left) {

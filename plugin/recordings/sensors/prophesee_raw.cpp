@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <fstream>
 #include <memory>
@@ -17,6 +16,7 @@
 
 #include "mapping/base/text.h"
 #include "plugin/recordings/sensors/evt_decoder.h"
+#include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
 namespace {
@@ -34,13 +34,6 @@ constexpr std::size_t kRawBlockBytes = std::size_t{1} << 18U;  // whole words of
 constexpr std::size_t kMaxRawHeaderBytes = std::size_t{1} << 16U;
 /// The EVT 3.0 clock is at most two periods ahead of a TIME_HIGH, also if the next one is late.
 constexpr std::int64_t kMaxAheadNs = 2 * 4'096'000;
-
-/// A side of the sensor in pixels.
-std::optional<int> sideOf(std::string_view text) {
-  constexpr int kMaxSide = 65'535;
-  const std::optional<int> side = parseNumber<int>(text);
-  return side && *side > 0 && *side <= kMaxSide ? side : std::nullopt;
-}
 
 /// Cameras by the beginning of a value in the header: of a generation, or of one system.
 struct KnownCamera {
@@ -68,15 +61,6 @@ std::optional<CameraSize> sizeOfCamera(std::string_view key, std::string_view va
   return std::nullopt;
 }
 
-/// The first bytes of a file, of at most the size of a header.
-std::string beginningOf(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string text(kMaxRawHeaderBytes, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return text;
-}
-
 /// Parses the lines of a header one after the other.
 class RawHeaderParser {
  public:
@@ -91,7 +75,7 @@ class RawHeaderParser {
       const std::string_view value =
           blank == std::string_view::npos ? std::string_view() : trimmed(line_.substr(blank));
       if (key == "end") break;
-      if (key == "evt") takeVersion(value);
+      if (key == "evt") takeEncoding(key, value, "2.0, 2.1 or 3.0");
       if (key == "format") takeFormat(value, header);
       if (key == "geometry") takeGeometry(value, header);
       if (key == "endianness") takeOrder(value);
@@ -124,20 +108,10 @@ class RawHeaderParser {
     return true;
   }
 
-  void takeVersion(std::string_view value) {
-    constexpr std::array<std::pair<std::string_view, EvtEncoding>, 3> kVersions = {
-        {{"2.0", EvtEncoding::kEvt2}, {"2.1", EvtEncoding::kEvt21}, {"3.0", EvtEncoding::kEvt3}}};
-    takeNamed(kVersions, "evt", value, "2.0, 2.1 or 3.0");
-  }
-
   /// "EVT3;height=720;width=1280"
   void takeFormat(std::string_view value, RawHeader& header) {
-    constexpr std::array<std::pair<std::string_view, EvtEncoding>, 3> kFormats = {
-        {{"EVT2", EvtEncoding::kEvt2},
-         {"EVT21", EvtEncoding::kEvt21},
-         {"EVT3", EvtEncoding::kEvt3}}};
     const std::vector<std::string_view> parts = splitWords(value, ";");
-    takeNamed(kFormats, "format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
+    takeEncoding("format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
     CameraSize size;
     for (const std::string_view part : parts) {
       const std::size_t equal = part.find('=');
@@ -146,21 +120,18 @@ class RawHeaderParser {
       const std::string_view number = part.substr(equal + 1);
       if (key == "endianness") takeOrder(number);
       if (key == "width" || key == "height") {
-        const std::optional<int> side = sideOf(number);
-        if (!side) throw fail(key, number, "a number of pixels from 1 to 65535");
-        (key == "width" ? size.width : size.height) = *side;
+        const int side = parseNumber<std::uint16_t>(number).value_or(0);
+        if (side == 0) throw fail(key, number, "a number of pixels from 1 to 65535");
+        (key == "width" ? size.width : size.height) = side;
       }
     }
     if (size.width > 0 && size.height > 0) header.size = size;
   }
 
   void takeGeometry(std::string_view value, RawHeader& header) {
-    const std::size_t cross = value.find('x');
-    const std::optional<int> width = sideOf(value.substr(0, cross));
-    const std::optional<int> height =
-        cross == std::string_view::npos ? std::nullopt : sideOf(value.substr(cross + 1));
-    if (!width || !height) throw fail("geometry", value, "WIDTHxHEIGHT in pixels");
-    header.size = CameraSize{*width, *height};
+    const std::optional<CameraSize> size = cameraSizeOf(value);
+    if (!size) throw fail("geometry", value, "WIDTHxHEIGHT in pixels");
+    header.size = size;
   }
 
   void takeOrder(std::string_view value) {
@@ -170,13 +141,20 @@ class RawHeaderParser {
     legacy_order_ = value == "legacy";
   }
 
-  template <typename Names>
-  void takeNamed(const Names& names, std::string_view key, std::string_view value,
-                 const char* expected) {
-    const auto found = std::find_if(names.begin(), names.end(),
-                                    [&](const auto& named) { return named.first == value; });
-    if (found == names.end()) throw fail(key, value, expected);
-    encoding_ = found->second;
+  void takeEncoding(std::string_view key, std::string_view value, const char* expected) {
+    constexpr struct {
+      std::string_view version;  // "evt"
+      std::string_view format;
+      EvtEncoding encoding;
+    } kEncodings[] = {{"2.0", "EVT2", EvtEncoding::kEvt2},
+                      {"2.1", "EVT21", EvtEncoding::kEvt21},
+                      {"3.0", "EVT3", EvtEncoding::kEvt3}};
+    for (const auto& [version, format, encoding] : kEncodings) {
+      if (value != (key == "evt" ? version : format)) continue;
+      encoding_ = encoding;
+      return;
+    }
+    throw fail(key, value, expected);
   }
 
   std::runtime_error fail(std::string_view key, std::string_view value,
@@ -211,7 +189,7 @@ class PropheseeRawStream : public EventStream {
       : file_(std::move(file)),
         stream_(openRaw(file_)),
         bytes_total_(std::filesystem::file_size(file_)),
-        header_(RawHeaderParser(file_, beginningOf(file_)).parse()),
+        header_(RawHeaderParser(file_, firstBytesOf(file_, kMaxRawHeaderBytes)).parse()),
         decoder_(header_.encoding),
         at_block_(decoder_),
         block_byte_(header_.bytes) {
@@ -313,7 +291,7 @@ class PropheseeRawStream : public EventStream {
 
 bool looksLikePropheseeRaw(const std::filesystem::path& file) {
   if (!isFile(file)) return false;
-  const std::string text = beginningOf(file);
+  const std::string text = firstBytesOf(file, kMaxRawHeaderBytes);
   const std::size_t lines_end = text.rfind('\n');
   const std::string_view lines = std::string_view(text).substr(0, lines_end);
   return lines.substr(0, 2) == "% " && (lines.find("% evt ") != std::string_view::npos ||

@@ -181,6 +181,14 @@ std::runtime_error FileContent::failure(const std::string& what) const {
       fmt::format("{}{}{}: {}", file_.string(), member_.empty() ? "" : "/", member_, what));
 }
 
+std::string firstContentOf(const std::filesystem::path& file, std::size_t count,
+                           const std::string& member) {
+  FileContent content(file, member);
+  std::string bytes(count, '\0');
+  bytes.resize(content.read(bytes.data(), count));
+  return bytes;
+}
+
 std::vector<std::string> membersOf(const std::filesystem::path& file) {
   std::vector<std::string> names;
 #ifdef EFM_WITH_ARCHIVES

@@ -57,6 +57,11 @@ class FileContent {
   std::unique_ptr<archive, CloseArchive> archive_;
 };
 
+/// The first bytes of a file's content: fewer if it has fewer.
+/// @throws std::runtime_error as `FileContent`.
+std::string firstContentOf(const std::filesystem::path& file, std::size_t count,
+                           const std::string& member = {});
+
 /// The names of the files in a zip archive, in its order.
 /// @throws std::runtime_error as `FileContent`.
 std::vector<std::string> membersOf(const std::filesystem::path& file);

@@ -165,12 +165,18 @@ inline bool isFile(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+/// The first bytes of a file as it is stored: fewer if it has fewer, none if it cannot be read.
+inline std::string firstBytesOf(const std::filesystem::path& file, std::size_t count) {
+  std::string bytes(count, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(count));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
 /// Whether a regular file begins with these bytes. Never throws.
 inline bool beginsWith(const std::filesystem::path& file, std::string_view start) {
-  if (!isFile(file)) return false;
-  std::ifstream stream(file, std::ios::binary);
-  std::string found(start.size(), '\0');
-  return stream.read(found.data(), static_cast<std::streamsize>(found.size())) && found == start;
+  return isFile(file) && firstBytesOf(file, start.size()) == start;
 }
 
 /// @throws std::runtime_error naming the cure, where a text is UTF-16 or has CR alone for line

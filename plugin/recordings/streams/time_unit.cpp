@@ -66,32 +66,15 @@ std::string guessOf(const TimeSample& sample, const UsualRate& usual) {
 
 std::optional<int> timeExponentOf(std::string_view unit) {
   constexpr struct {
-    std::string_view name;
     int exponent;
-  } kUnits[] = {{"s", 0},
-                {"sec", 0},
-                {"secs", 0},
-                {"second", 0},
-                {"seconds", 0},
-                {"ms", -3},
-                {"msec", -3},
-                {"msecs", -3},
-                {"millisecond", -3},
-                {"milliseconds", -3},
-                {"us", -6},
-                {"µs", -6},
-                {"μs", -6},
-                {"usec", -6},
-                {"usecs", -6},
-                {"microsecond", -6},
-                {"microseconds", -6},
-                {"ns", -9},
-                {"nsec", -9},
-                {"nsecs", -9},
-                {"nanosecond", -9},
-                {"nanoseconds", -9}};
-  for (const auto& [name, exponent] : kUnits) {
-    if (unit == name) return exponent;
+    std::string_view names;  // between blanks
+  } kUnits[] = {{0, " s sec secs second seconds "},
+                {-3, " ms msec msecs millisecond milliseconds "},
+                {-6, " us µs μs usec usecs microsecond microseconds "},
+                {-9, " ns nsec nsecs nanosecond nanoseconds "}};
+  if (unit.empty() || unit.find(' ') != std::string_view::npos) return std::nullopt;
+  for (const auto& [exponent, names] : kUnits) {
+    if (names.find(fmt::format(" {} ", unit)) != std::string_view::npos) return exponent;
   }
   return std::nullopt;
 }

@@ -18,14 +18,19 @@ namespace efm {
 
 inline constexpr std::int64_t kNanosecondsPerMicrosecond = 1'000;
 
-/// The size that "640x480" says; nothing for other texts.
+/// The size that two texts say; nothing if they are no whole numbers from 1 to 65535.
+inline std::optional<CameraSize> cameraSizeOf(std::string_view width_text,
+                                              std::string_view height_text) {
+  const auto width = parseNumber<std::uint16_t>(width_text);
+  const auto height = parseNumber<std::uint16_t>(height_text);
+  if (!width || !height || *width == 0 || *height == 0) return std::nullopt;
+  return CameraSize{*width, *height};
+}
+/// The size that "640x480" says.
 inline std::optional<CameraSize> cameraSizeOf(std::string_view text) {
   const std::size_t cross = text.find('x');
   if (cross == std::string_view::npos) return std::nullopt;
-  const auto width = parseNumber<std::uint16_t>(text.substr(0, cross));
-  const auto height = parseNumber<std::uint16_t>(text.substr(cross + 1));
-  if (!width || !height || *width == 0 || *height == 0) return std::nullopt;
-  return CameraSize{*width, *height};
+  return cameraSizeOf(text.substr(0, cross), text.substr(cross + 1));
 }
 
 /// A number of a file as a whole number within [min, max]; nothing if it is none.

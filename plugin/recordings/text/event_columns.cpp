@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -16,14 +17,6 @@ namespace efm {
 namespace {
 
 constexpr std::size_t kSampledLines = 5000;
-constexpr const char* kExpectedNames = "t=NAME x=NAME y=NAME p=NAME, each once";
-
-std::string_view takeTextLine(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = trimmed(text.substr(0, end));
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
-}
 
 /// With semicolons, commas are decimal ones.
 char separatorOf(std::string_view line) {
@@ -37,7 +30,7 @@ bool hasNumber(const std::vector<std::string_view>& fields) {
 }
 
 bool isComplete(const std::string& order) {
-  return std::all_of(std::begin("txyp"), std::end("txyp") - 1, [&](char column) {
+  return std::all_of(kEventColumns.begin(), kEventColumns.end(), [&](char column) {
     return std::count(order.begin(), order.end(), column) == 1;
   });
 }
@@ -78,24 +71,17 @@ std::string orderOfOption(const std::string& text) {
       inQuotes(text)));
 }
 
-std::optional<CameraSize> sizeIn(const std::vector<std::string_view>& fields) {
-  if (fields.size() != 2) return std::nullopt;
-  const auto width = parseNumber<std::uint16_t>(fields[0]);
-  const auto height = parseNumber<std::uint16_t>(fields[1]);
-  if (!width || !height || *width == 0 || *height == 0) return std::nullopt;
-  return CameraSize{*width, *height};
-}
-
 /// Skips the lines before the first event. @return the rest of the text.
 std::string_view takeHeader(std::string_view text, EventColumns& columns, Header& header) {
   for (std::uint64_t lines = 0; !text.empty();) {
     const std::string_view rest = text;
-    const std::string_view line = takeTextLine(text);
+    const std::string_view line = trimmed(takeLine(text));
     ++lines;
     const bool comment = isComment(line);
     const std::vector<std::string_view> fields = eventFields(line, separatorOf(line));
     if (line.empty()) continue;
-    const std::optional<CameraSize> size = comment ? std::nullopt : sizeIn(fields);
+    std::optional<CameraSize> size;
+    if (!comment && fields.size() == 2) size = cameraSizeOf(fields[0], fields[1]);
     if (!comment && !size && hasNumber(fields)) return rest;
     if (size && (columns.size || text.empty())) return rest;
     if (size) columns.size = size;
@@ -176,7 +162,7 @@ std::optional<FirstEvent> firstEventOf(std::string_view beginning) {
   if (rest.empty()) return std::nullopt;
   const std::string_view before = beginning.substr(0, beginning.size() - rest.size());
   first.line = 1 + static_cast<std::uint64_t>(std::count(before.begin(), before.end(), '\n'));
-  first.text = takeTextLine(rest);
+  first.text = trimmed(takeLine(rest));
   first.fields = eventFields(first.text, separatorOf(first.text));
   first.order = columns.order;
   return first;
@@ -200,15 +186,7 @@ bool hasDecimalCommas(std::string_view line) {
 }  // namespace
 
 std::vector<std::string_view> eventFields(std::string_view line, char separator) {
-  if (separator == ' ') return splitWords(line);
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(separator, begin), line.size());
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
-  }
-  if (fields.back().empty()) fields.pop_back();  // an empty line, a separator at the end
-  return fields;
+  return separator == ' ' ? splitWords(line) : splitFields(line, {&separator, 1});
 }
 
 EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& options,
@@ -220,7 +198,7 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
   std::string_view rest = takeHeader(beginning, columns, header);
   TextRows rows;
   for (std::size_t k = 0; k < kSampledLines && !rest.empty(); ++k) {
-    const std::string_view line = takeTextLine(rest);
+    const std::string_view line = trimmed(takeLine(rest));
     if (k == 0) columns.separator = separatorOf(line);
     rows.push_back(eventFields(line.substr(0, line.find('#')), columns.separator));
   }
@@ -348,21 +326,109 @@ std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
 std::optional<EventNames> eventNamesOf(const std::string& option) {
   if (option.find('=') == std::string::npos) return std::nullopt;
   EventNames names;
+  bool once = true;
   for (const std::string_view word : splitWords(option, " ,")) {
-    std::string* const name = word.substr(0, 2) == "t="   ? &names.t
-                              : word.substr(0, 2) == "x=" ? &names.x
-                              : word.substr(0, 2) == "y=" ? &names.y
-                              : word.substr(0, 2) == "p=" ? &names.p
-                                                          : nullptr;
-    if (name == nullptr || !name->empty() || word.size() < 3) {
-      throw std::runtime_error(
-          fmt::format("--event-columns {}: expected {}", inQuotes(option), kExpectedNames));
-    }
-    *name = word.substr(2);
+    const bool is_name = word.size() > 2 && word[1] == '=';
+    const std::size_t column = is_name ? kEventColumns.find(word[0]) : std::string_view::npos;
+    once = once && column != std::string_view::npos && names[column].empty();
+    if (once) names[column] = word.substr(2);
   }
-  if (!names.t.empty() && !names.x.empty() && !names.y.empty() && !names.p.empty()) return names;
-  throw std::runtime_error(
-      fmt::format("--event-columns {}: expected {}", inQuotes(option), kExpectedNames));
+  if (once && hasAll(names)) return names;
+  throw std::runtime_error(fmt::format(
+      "--event-columns {}: expected t=NAME x=NAME y=NAME p=NAME, each once", inQuotes(option)));
+}
+
+bool hasAll(const EventNames& names) {
+  return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.empty(); });
+}
+
+namespace {
+
+constexpr std::size_t kColumns = kEventColumns.size();
+
+/// The values of a column.
+struct ColumnValues {
+  bool whole = true;
+  double min = std::numeric_limits<double>::infinity();
+  double max = -min;
+  double max_drop = 0;  // below an earlier value
+  bool has_zero = false;
+  bool has_one = false;
+  bool has_minus_one = false;
+  bool has_others = false;
+
+  void add(double value) {
+    whole = whole && std::floor(value) == value;
+    min = std::min(min, value);
+    max = std::max(max, value);
+    max_drop = std::max(max_drop, max - value);
+    has_zero |= value == 0;
+    has_one |= value == 1;
+    has_minus_one |= value == -1;
+    has_others |= value != 0 && value != 1 && value != -1;
+  }
+  /// A time comes late now and then. Pixels come and go over the whole image.
+  bool rises() const { return max > min && max_drop <= 0.1 * (max - min); }
+  bool mayBeTime() const { return rises() || max == min || !whole; }
+  bool mayBePolarity() const { return whole && !has_others && !(has_zero && has_minus_one); }
+  bool hasBothPolarities() const { return has_one && (has_zero || has_minus_one); }
+  bool mayBePixel() const { return whole && min >= 0 && max <= 65'535; }
+};
+
+using AllValues = std::array<ColumnValues, kColumns>;
+
+/// @return the number of rows.
+std::size_t addRows(const EventRows& rows, AllValues& columns) {
+  std::size_t count = 0;
+  for (const std::vector<double>& row : rows) {
+    if (row.size() != kColumns) continue;
+    for (std::size_t k = 0; k < kColumns; ++k) columns[k].add(row[k]);
+    ++count;
+  }
+  return count;
+}
+
+/// @param strict whether the time must rise, and the pixels must differ.
+bool isPossible(const AllValues& columns, const std::string& order, bool strict) {
+  for (std::size_t k = 0; k < kColumns; ++k) {
+    const ColumnValues& values = columns[k];
+    const bool varies = values.max - values.min >= 2;
+    if (order[k] == 't' && !(strict ? values.rises() : values.mayBeTime())) return false;
+    if (order[k] == 'p' && !values.mayBePolarity()) return false;
+    const bool is_pixel = order[k] == 'x' || order[k] == 'y';
+    if (is_pixel && !(values.mayBePixel() && (varies || !strict))) return false;
+  }
+  return true;
+}
+
+std::vector<std::string> allOrders() {
+  std::vector<std::string> orders;
+  std::string order = "ptxy";  // sorted
+  do {
+    if (order.find('x') < order.find('y')) orders.push_back(order);
+  } while (std::next_permutation(order.begin(), order.end()));
+  return orders;
+}
+
+}  // namespace
+
+std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::string& expected) {
+  constexpr std::size_t kFew = 10;    // say nothing
+  constexpr std::size_t kMany = 100;  // leave no doubt
+  AllValues columns;
+  const std::size_t count = addRows(rows, columns);
+  if (count < kFew) return std::nullopt;
+  if (expected.size() == kColumns && isPossible(columns, expected, false)) {
+    return ColumnOrder{expected, true};
+  }
+  std::optional<ColumnOrder> found;
+  for (const std::string& order : allOrders()) {
+    if (!isPossible(columns, order, true)) continue;
+    if (found) return std::nullopt;
+    const ColumnValues& polarity = columns[order.find('p')];
+    found = ColumnOrder{order, count >= kMany && polarity.hasBothPolarities()};
+  }
+  return found;
 }
 
 }  // namespace efm

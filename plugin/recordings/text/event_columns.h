@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -79,14 +80,14 @@ char eventColumnOf(const HeaderWord& word);
 std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
                             const std::string& file, std::vector<Warning>& warnings);
 
-/// The names that `--event-columns "t=NAME x=NAME y=NAME p=NAME"` gives, of arrays, data sets or
-/// fields.
-struct EventNames {
-  std::string t;
-  std::string x;
-  std::string y;
-  std::string p;
-};
+/// The columns of an event.
+inline constexpr std::string_view kEventColumns = "txyp";
+
+/// The names of the columns, in the order of `kEventColumns`: of arrays, data sets or fields.
+using EventNames = std::array<std::string, 4>;
+bool hasAll(const EventNames& names);
+
+/// The names that `--event-columns "t=NAME x=NAME y=NAME p=NAME"` gives.
 /// @return nothing where the option has no `=`.
 /// @throws std::runtime_error where it does not name each of them once.
 std::optional<EventNames> eventNamesOf(const std::string& option);

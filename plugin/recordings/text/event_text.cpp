@@ -334,9 +334,7 @@ std::string EventTextStream::place(std::uint64_t line) const {
 
 std::string beginningOfText(const std::filesystem::path& file) {
   constexpr std::size_t kBytes = 4096;
-  std::string bytes(kBytes, '\0');
-  FileContent content(file);
-  bytes.resize(content.read(bytes.data(), kBytes));
+  const std::string bytes = firstContentOf(file, kBytes);
   const std::string_view text = withoutByteOrderMark(bytes);
   requireTextLines(text, file.string());
   return std::string(wholeLines(text, bytes.size() < kBytes));

@@ -24,14 +24,7 @@ constexpr std::array<const char*, kPoseFields> kPoseFieldNames = {"t",  "tx", "t
 /// The fields of a line: commas or semicolons separate them if there are any, else blanks.
 std::vector<std::string_view> poseFields(std::string_view line) {
   if (line.find_first_of(",;") == std::string_view::npos) return splitWords(line);
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find_first_of(",;", begin), line.size());
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
-  }
-  if (fields.back().empty()) fields.pop_back();  // a comma at the end
-  return fields;
+  return splitFields(line, ",;");
 }
 
 bool startsWithAny(std::string_view text, std::initializer_list<std::string_view> starts) {
@@ -127,9 +120,7 @@ std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
                                 const std::string& file) {
   std::vector<PoseLine> lines;
   for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = trimmed(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::string_view line = trimmed(takeLine(text));
     if (line.empty()) continue;
     const bool comment = line.front() == '#';
     const bool number_first = !comment && parseNumber<double>(poseFields(line).front());
@@ -227,12 +218,16 @@ bool looksLikePoseLines(std::string_view beginning) {
   }
 }
 
-std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
-                                         const ReaderOptions& options) {
-  std::vector<StampedPose> poses = readPoseText(file, options);
+std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
+                                      const std::filesystem::path& file) {
   if (!poses.empty()) return poses;
   throw std::runtime_error(file.string() +
                            ": no poses: expected at least one line t tx ty tz qx qy qz qw");
+}
+
+std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
+                                         const ReaderOptions& options) {
+  return requirePoses(readPoseText(file, options), file);
 }
 
 }  // namespace efm

@@ -29,6 +29,11 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
 /// Whether the whole lines at the beginning of a file are poses.
 bool looksLikePoseLines(std::string_view beginning);
 
+/// @return the poses.
+/// @throws std::runtime_error if there is none.
+std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
+                                      const std::filesystem::path& file);
+
 /// The same for the poses of a recording: at least one.
 /// @throws std::runtime_error if the file has no pose.
 std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
