@@ -50,13 +50,8 @@ std::string_view npyValueOf(std::string_view dictionary, const std::string& key)
   return trimmed(dictionary.substr(colon + 1));
 }
 
-struct NpyType {
-  NumberType type;
-  bool big_endian;
-};
-
 /// The type of "<f4"; nothing where it is no number.
-std::optional<NpyType> npyTypeOf(std::string_view descr) {
+std::optional<NpyField> npyTypeOf(std::string_view descr) {
   if (descr.size() != 3) return std::nullopt;
   const char order = descr[0];
   const char kind = descr.substr(1) == "b1" ? 'u' : descr[1];
@@ -64,7 +59,7 @@ std::optional<NpyType> npyTypeOf(std::string_view descr) {
   if (!type || !(order == '<' || order == '>' || (order == '|' && sizeOf(*type) == 1))) {
     return std::nullopt;
   }
-  return NpyType{*type, order == '>'};
+  return NpyField{"", *type, order == '>'};
 }
 
 std::runtime_error wrongNpyType(std::string_view descr) {
@@ -97,28 +92,25 @@ class NpyFieldParser {
     take('[');
     while (!takes(']')) {
       take('(');
-      NpyField field;
-      field.name = name();
-      field.offset = bytes;
+      const std::string field_name = name();
       take(',');
       std::size_t size = 0;
-      bool is_number = false;
+      std::optional<NpyField> number;
       if (next() == '[') {
         size = list(nullptr, depth + 1);
       } else {
         const std::string_view type = quoted();
-        const std::optional<NpyType> number = npyTypeOf(type);
-        is_number = number.has_value();
-        if (number) field.type = number->type;
-        if (number) field.big_endian = number->big_endian;
+        number = npyTypeOf(type);
         size = number ? sizeOf(number->type) : bytesOf(type);
       }
       std::size_t count = 1;
       if (takes(',') && next() != ')') count = arraySize();
       take(')');
       if (count > kMaxElementBytes || size * count > kMaxElementBytes - bytes) throw fail();
+      if (number && count == 1 && fields != nullptr) {
+        fields->push_back({field_name, number->type, number->big_endian, bytes});
+      }
       bytes += size * count;
-      if (is_number && count == 1 && fields != nullptr) fields->push_back(std::move(field));
       if (!takes(',') && next() != ']') throw fail();
     }
     return bytes;

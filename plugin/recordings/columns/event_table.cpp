@@ -89,7 +89,8 @@ class TableEvents : public EventStream {
   void findUnit(const ReaderOptions& options) {
     TimeSample sample;
     const RowColumn& t = column('t');
-    for (std::size_t row = 0; row < sampledRows(t); ++row) sample.add(t.number(row));
+    const std::size_t rows = sampledRows(t);
+    for (std::size_t row = 0; row < rows; ++row) sample.add(t.number(row));
     TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, table_.times);
     table_.time_unit_ns = nanosecondsPer(unit.exponent);
     if (unit.warning) table_.warnings.push_back(std::move(*unit.warning));

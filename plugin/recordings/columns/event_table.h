@@ -98,7 +98,8 @@ struct EventTable {
 /// @throws std::runtime_error if the unit of time is not certain (`findTimeUnit`).
 std::unique_ptr<EventStream> eventsOf(EventTable table, const ReaderOptions& options);
 
-/// The times of the first rows, to find their unit and order: at most 5000 of the first block.
+/// The number of rows that show the unit of times and the order of columns: at most 5000, of the
+/// first block.
 std::size_t sampledRows(const RowColumn& column);
 
 }  // namespace efm

@@ -31,8 +31,8 @@ std::vector<CameraFile> hdf5FilesIn(const std::filesystem::path& folder);
 /// Whether it is an HDF5 file or a folder with `hdf5FilesIn`. Never throws.
 bool looksLikeHdf5(const std::filesystem::path& source);
 
-/// Opens HDF5 files with events (`hdf5Layouts` in hdf5_recording.cpp), poses or both, and folders with them (see
-/// `hdf5FilesIn`). A folder may have camchain.yaml and poses.txt, too. Poses are
+/// Opens HDF5 files with events (`hdf5Layouts` in hdf5_recording.cpp), poses or both, and folders
+/// with them (see `hdf5FilesIn`). A folder may have camchain.yaml and poses.txt, too. Poses are
 ///   /davis/left/pose, /davis/left/pose_ts   MVSEC: T_world_cam0, seconds
 ///   /Cn_T_C0, /ts                           M3ED: T_cam0_world, microseconds
 /// M3ED has the calibration in the file: calib/ beside the events of a camera.

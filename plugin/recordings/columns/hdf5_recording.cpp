@@ -44,9 +44,8 @@ struct Hdf5Layout {
   /// Of t. 0: it is not known. Real times have this unit only if it is seconds. An unknown unit is
   /// found from the values (`findTimeUnit`).
   std::int64_t time_unit_ns = 0;
-  std::string index{};  ///< In the group: the first event of each millisecond of t. Or empty.
-  std::string
-      offset{};  ///< In the group: is added to t; a whole number of `time_unit_ns`. Or empty.
+  std::string index{};   ///< In the group: the first event of each millisecond of t. Or empty.
+  std::string offset{};  ///< In the group: added to t, in units of `time_unit_ns`. Or empty.
   std::optional<CameraSize> size{};  ///< Of the sensor, if all recordings have the same.
 
   /// The data set by which a file with this layout is known.
