@@ -7,8 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "mapping/base/text.h"
-
 namespace efm {
 
 /// The known name that was probably meant by a mistyped one: the one with the fewest letters
@@ -47,17 +45,6 @@ Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   }
   throw std::invalid_argument("'" + std::string(name) +
                               "' is unknown: " + expectedName(name, known));
-}
-
-/// Refuses an option whose value is out of range.
-/// @param holds the condition of a valid value, so that NaN is refused too.
-template <typename Value>
-void requireOption(bool holds, std::string_view key, const Value& value,
-                   std::string_view expected) {
-  if (holds) return;
-  NumberText message(15);  // as typed: 0.1, not 0.10000000000000001
-  message << key << " = " << value << ": must be " << expected;
-  throw std::invalid_argument(message.str());
 }
 
 }  // namespace efm

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/depth/aggregated_extraction.h"
 #include "mapping/depth/peak_fit.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {

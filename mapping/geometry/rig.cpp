@@ -11,6 +11,7 @@
 #include <string>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

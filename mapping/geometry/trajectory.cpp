@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

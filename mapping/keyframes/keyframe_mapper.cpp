@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/events/event.h"
 
 namespace efm {

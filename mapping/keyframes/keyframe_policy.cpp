@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <numeric>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {

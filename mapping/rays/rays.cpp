@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 namespace {

@@ -15,7 +15,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
 #include "mapping/sweep/ray_bins.h"

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "mapping/depth/peak_fit.h"
 

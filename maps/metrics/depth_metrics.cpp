@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "maps/metrics/sample_statistics.h"
 
 namespace efm {

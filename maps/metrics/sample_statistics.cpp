@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/depth/peak_fit.h"
 
 namespace efm {

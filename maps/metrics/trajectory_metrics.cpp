@@ -11,7 +11,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 namespace {

@@ -19,7 +19,7 @@
 #include <cmath>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/depth/peak_fit.h"
 #include "maps/refinement/pose_refinement.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 namespace {

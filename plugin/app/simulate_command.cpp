@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/app/arguments.h"

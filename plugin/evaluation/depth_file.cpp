@@ -14,7 +14,7 @@
 #include <string_view>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"

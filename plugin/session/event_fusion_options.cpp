@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "maps/cloud/keyframe_cloud.h"
 
 namespace efm {

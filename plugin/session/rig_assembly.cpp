@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/session/health_checks.h"

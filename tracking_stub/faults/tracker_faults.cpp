@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/furnishing.h"

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/scenes.h"

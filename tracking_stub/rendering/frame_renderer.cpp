@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/lens.h"
 
 namespace efm {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 
 namespace efm {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 

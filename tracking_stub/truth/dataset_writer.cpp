@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/reference_view.h"

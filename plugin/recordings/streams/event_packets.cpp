@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/events/event.h"
 
 namespace efm {

@@ -15,6 +15,7 @@
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "test/plugin/temporary_folder.h"
 

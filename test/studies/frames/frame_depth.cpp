@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/depth/peak_fit.h"
 #include "test/studies/frames/edge_kinds.h"
