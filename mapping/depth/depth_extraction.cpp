@@ -25,19 +25,10 @@ std::string_view nameOf(ExtractionMethod method) { return nameIn(kMethods, metho
 ExtractionMethod extractionMethodFromName(std::string_view name) { return valueIn(kMethods, name); }
 
 void DepthExtractionOptions::validate() const {
-  requireOption(threshold_kernel >= 3 && threshold_kernel <= 255 && threshold_kernel % 2 == 1,
-                "threshold_kernel", threshold_kernel, "odd, 3 to 255");
-  requireOption(threshold_c >= -255 && threshold_c <= 255, "threshold_c", threshold_c,
-                "-255 to 255");
-  requireOption(max_confidence.level != WhiteLevel::kFixed ||
-                    (std::isfinite(max_confidence.fixed) && max_confidence.fixed > 0),
-                "max_confidence", max_confidence.fixed, "finite and above 0");
-  requireOption(min_local_contrast > 0 && std::isfinite(min_local_contrast), "min_local_contrast",
-                min_local_contrast, "finite and above 0");
-  requireOption(min_quality >= 0 && std::isfinite(min_quality), "min_quality", min_quality,
-                "finite, 0 or above");
-  requireOption(median_size >= 1 && median_size <= 255 && median_size % 2 == 1, "median_size",
-                median_size, "odd, 1 to 255");
+  requireFields(*this);
+  const double white = max_confidence.fixed;
+  requireOption(max_confidence.level != WhiteLevel::kFixed || (std::isfinite(white) && white > 0),
+                "max_confidence", white, "finite and above 0");
 }
 
 bool usesColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "mapping/base/option.h"
 #include "mapping/depth/depth_map.h"
 #include "mapping/dsi/dsi_columns.h"
 #include "mapping/geometry/reference_view.h"
@@ -58,6 +59,20 @@ struct DepthExtractionOptions {
   int median_size = 5;   ///< Side of the median window in pixels; odd, 1 (none) to 255.
   bool subplane = true;  ///< Fit a parabola through the peak and its neighbours.
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("extraction", self.extraction);
+    visit("threshold_kernel", self.threshold_kernel, Allowed::from(3, 255, "odd, 3 to 255").odd());
+    visit("min_local_contrast", self.min_local_contrast,
+          Allowed::above(0, Allowed::kFinite, "finite and above 0"));
+    visit("min_quality", self.min_quality,
+          Allowed::from(0, Allowed::kFinite, "finite, 0 or above"));
+    visit("threshold_c", self.threshold_c, Allowed::from(-255, 255, "-255 to 255"));
+    visit("max_confidence", self.max_confidence);
+    visit("median_size", self.median_size, Allowed::from(1, 255, "odd, 1 to 255").odd());
+    visit("dilate", self.dilate);
+    visit("subplane", self.subplane);
+  }
   void validate() const;
 };
 

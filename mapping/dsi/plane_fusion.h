@@ -71,6 +71,13 @@ struct FusionOptions {
   FusionRule across_cameras = FusionRule::kHarmonic;
   FusionRule across_time = FusionRule::kArithmetic;
   FusionOrder order = FusionOrder::kCamerasThenTime;
+
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("across_cameras", self.across_cameras);
+    visit("across_time", self.across_time);
+    visit("order", self.order);
+  }
 };
 
 /// The numbers of inputs of a plane.

@@ -25,14 +25,6 @@ bool BackgroundActivityFilter::isIsolated(const Event& event) {
                       [&](std::ptrdiff_t offset) { return pixel[offset] >= from_ns; });
 }
 
-void HotPixelOptions::validate() const {
-  requireOption(ratio >= 2 && ratio <= 1000, "hot_pixel_ratio", ratio, "from 2 to 1000");
-  requireOption(period_s >= 0.001 && period_s <= 100, "hot_pixel_period_s", period_s,
-                "from 0.001 to 100 (seconds)");
-  requireOption(min_events >= 2 && min_events <= 30'000, "hot_pixel_min_events", min_events,
-                "from 2 to 30000");
-}
-
 HotPixelFilter::HotPixelFilter(int width, int height, const HotPixelOptions& options)
     : ratio_(options.ratio),
       min_events_(static_cast<std::uint32_t>(options.min_events)),
@@ -78,14 +70,6 @@ bool HotPixelFilter::isBusiest(const Event& event) {
     if (ratio_ * eventsIn(pixel[offset]) >= own && --busy_ones_left == 0) return false;
   }
   return true;
-}
-
-void EventFilterOptions::validate() const {
-  hot_pixel.validate();
-  // Time has a resolution of a nanosecond.
-  requireOption(
-      background_activity_s == 0 || (background_activity_s >= 1e-9 && background_activity_s <= 10),
-      "background_activity_s", background_activity_s, "0, or from 1e-9 to 10 (seconds)");
 }
 
 EventFilter::EventFilter(int width, int height, const EventFilterOptions& options) {

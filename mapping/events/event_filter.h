@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/event.h"
 
 namespace efm {
@@ -43,7 +44,14 @@ struct HotPixelOptions {
   /// causes: from black to white is some 20 contrast thresholds.
   int min_events = 50;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("hot_pixel_ratio", self.ratio, Allowed::from(2, 1000, "from 2 to 1000"));
+    visit("hot_pixel_period_s", self.period_s,
+          Allowed::from(0.001, 100, "from 0.001 to 100 (seconds)"));
+    visit("hot_pixel_min_events", self.min_events, Allowed::from(2, 30'000, "from 2 to 30000"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Finds events of hot pixels, which fire all the time, independent of the scene. A hot pixel votes
@@ -114,7 +122,15 @@ struct EventFilterOptions {
   double background_activity_s = 0;
 
   bool any() const { return hot_pixels || background_activity_s > 0; }
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("hot_pixels", self.hot_pixels);
+    visit(self.hot_pixel);
+    // Time has a resolution of a nanosecond.
+    visit("background_activity_s", self.background_activity_s,
+          Allowed::from(1e-9, 10, "0, or from 1e-9 to 10 (seconds)").orZero());
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The filters of one camera, one after the other: an event of a hot pixel supports no other.

@@ -21,8 +21,6 @@ void TimeLimits::validate() const {
 
 namespace {
 
-constexpr int kMaxSubintervals = 1000;
-
 constexpr NamedChoice<SubintervalSplit> kSplits[] = {
     {SubintervalSplit::kDuration, "duration"},
     {SubintervalSplit::kCount, "count"},
@@ -54,10 +52,6 @@ std::string_view nameOf(SubintervalShuffle shuffle) { return nameIn(kShuffles, s
 SubintervalSplit subintervalSplitFromName(std::string_view name) { return valueIn(kSplits, name); }
 SubintervalShuffle subintervalShuffleFromName(std::string_view name) {
   return valueIn(kShuffles, name);
-}
-
-void SubintervalOptions::validate() const {
-  requireOption(count >= 1 && count <= kMaxSubintervals, "subintervals", count, "1 to 1000");
 }
 
 std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_ns,
@@ -98,17 +92,6 @@ std::vector<std::vector<int>> assignSubintervals(int cameras, const SubintervalO
     }
   }
   return assignment;
-}
-
-namespace {
-
-constexpr int kMaxTimeSlices = 1000;
-
-}  // namespace
-
-void SplitFusionOptions::validate() const {
-  requireOption(time_slices >= 1 && time_slices <= kMaxTimeSlices, "time_slices", time_slices,
-                "1 to 1000");
 }
 
 EventSpan EventPart::select(PolaritySplit& split) const {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/event.h"
 #include "mapping/geometry/lens.h"
 #include "mapping/geometry/reference_view.h"
@@ -62,7 +63,14 @@ struct SubintervalOptions {
   SubintervalShuffle shuffle = SubintervalShuffle::kNone;
   std::uint32_t shuffle_seed = 1;  ///< Of `kRandom`.
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("subintervals", self.count, Allowed::from(1, 1000, "1 to 1000"));
+    visit("split", self.split);
+    visit("shuffle", self.shuffle);
+    visit("shuffle_seed", self.shuffle_seed);
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Divides one camera's events of the window [t0, t1) into consecutive, half-open sub-intervals.
@@ -116,7 +124,12 @@ struct SplitFusionOptions {
   int time_slices = 2;
 
   int polarities() const { return polarity ? 2 : 1; }
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("split_polarity", self.polarity);
+    visit("time_slices", self.time_slices, Allowed::from(1, 1000, "1 to 1000"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The events of a span, divided by polarity.

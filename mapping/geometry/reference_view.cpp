@@ -29,19 +29,13 @@ std::string_view nameOf(PlaneSpacing spacing) { return nameIn(kSpacings, spacing
 PlaneSpacing planeSpacingFromName(std::string_view name) { return valueIn(kSpacings, name); }
 
 void DepthPlanesOptions::validate() const {
-  constexpr int kMaxPlanes = 100'000;
   // No camera sees depths outside; beyond, planes and votes lose their digits.
   constexpr double kMaxDepthM = 1e6;
-  requireOption(std::isfinite(min_depth_m) && min_depth_m > 0, "min_depth_m", min_depth_m,
-                "finite and above 0");
-  requireOption(std::isfinite(max_depth_m) && max_depth_m > kMinDepthM, "max_depth_m", max_depth_m,
-                "finite and above 0.001");
+  requireFields(*this);
   requireOption(max_depth_m > min_depth_m, "max_depth_m", max_depth_m,
-                "finite and above min_depth_m");
+                "finite and above min_depth_m", {"min_depth_m"});
   requireOption(min_depth_m >= kMinDepthM, "min_depth_m", min_depth_m, "at least 0.001");
   requireOption(max_depth_m <= kMaxDepthM, "max_depth_m", max_depth_m, "at most 1000000");
-  requireOption(num_planes >= 1 && num_planes <= kMaxPlanes, "num_planes", num_planes,
-                "1 to 100000");
 }
 
 DepthPlanes::DepthPlanes(const DepthPlanesOptions& options) : options_(options) {
@@ -73,15 +67,13 @@ double DepthPlanes::inverseDepthStep() const {
 namespace {
 
 constexpr int kMaxSide = 65535;
-void requireSide(const std::optional<int>& side, const char* key) {
-  requireOption(!side || (*side >= 1 && *side <= kMaxSide), key, side.value_or(0), "1 to 65535");
-}
 
 /// More pixels are a mistake that would exhaust the memory.
 void requirePixels(std::int64_t width, std::int64_t height) {
   constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
   requireOption(width * height <= kMaxPixels, "width", width,
-                "at most 67108864 pixels together with the height of " + std::to_string(height));
+                "at most 67108864 pixels together with the height of " + std::to_string(height),
+                {"height"});
 }
 
 /// One side of the image, given the other, with the camera's aspect ratio.
@@ -93,10 +85,7 @@ int sideInProportion(int other, int own_of_camera, int other_of_camera) {
 }  // namespace
 
 void ReferenceViewOptions::validate() const {
-  requireOption(!fov_deg || (*fov_deg > 0 && *fov_deg < 180), "fov_deg", fov_deg.value_or(0),
-                "above 0 and below 180");
-  requireSide(width, "width");
-  requireSide(height, "height");
+  requireFields(*this);
   if (width && height) requirePixels(*width, *height);
   for (int axis = 0; axis < 3; ++axis) {
     requireOption(std::isfinite(offset_m[axis]), "rv_offset_m", offset_m[axis], "finite");

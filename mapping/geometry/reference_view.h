@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rig.h"
 
 namespace efm {
@@ -29,6 +30,16 @@ struct DepthPlanesOptions {
   int num_planes = 100;      ///< At least 1; a single plane lies at `min_depth_m`.
   PlaneSpacing spacing = PlaneSpacing::kInverse;
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    // Not finite and not positive depths first: `validate` has narrower limits.
+    visit("min_depth_m", self.min_depth_m,
+          Allowed::above(0, Allowed::kFinite, "finite and above 0"));
+    visit("max_depth_m", self.max_depth_m,
+          Allowed::above(0.001, Allowed::kFinite, "finite and above 0.001"));
+    visit("num_planes", self.num_planes, Allowed::from(1, 100'000, "1 to 100000"));
+    visit("spacing", self.spacing);
+  }
   void validate() const;
 };
 
@@ -90,6 +101,13 @@ struct ReferenceViewOptions {
   /// Shift along the view's own axes (x right, y down, z forward), metres.
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("fov_deg", self.fov_deg, Allowed::above(0, 180, "above 0 and below 180").below());
+    visit("width", self.width, Allowed::from(1, 65'535, "1 to 65535"));
+    visit("height", self.height, Allowed::from(1, 65'535, "1 to 65535"));
+    visit("rv_offset_m", self.offset_m);
+  }
   void validate() const;
 };
 

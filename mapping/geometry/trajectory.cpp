@@ -20,11 +20,6 @@ bool later(std::int64_t t_ns, const StampedPose& pose) { return t_ns < pose.t_ns
 
 }  // namespace
 
-void TrajectoryOptions::validate() const {
-  requireOption(max_pose_gap_s > 0 && max_pose_gap_s <= 1e6, "max_pose_gap_s", max_pose_gap_s,
-                "above 0 and at most 1e6");
-}
-
 Rigid3 TrajectorySegment::poseAt(std::int64_t t_ns) const {
   const std::int64_t length_ns = last.t_ns - first.t_ns;
   if (length_ns == 0) return first.T_world_rig;

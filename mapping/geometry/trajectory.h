@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
@@ -36,7 +37,11 @@ struct TrajectoryOptions {
   /// have gaps up to 0.13 s that interpolation still bridges well.
   double max_pose_gap_s = 0.25;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("max_pose_gap_s", self.max_pose_gap_s, Allowed::above(0, 1e6, "above 0 and at most 1e6"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Two neighbouring poses and the closed interval between them; both are the same pose where a pose

@@ -175,15 +175,9 @@ Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference)
 }
 
 void KeyframePolicyOptions::validate() const {
-  requireOption(window_s >= 1e-6 && window_s <= 1e6, "window_s", window_s, "1e-6 to 1e6");
-  requireOption(stride_s >= 1e-6 && stride_s <= 1e6, "stride_s", stride_s, "1e-6 to 1e6");
+  requireFields(*this);
   requireOption(policy != KeyframePolicyKind::kBaseline || stride_s <= window_s, "stride_s",
-                stride_s, "at most window_s with the policy 'baseline'");
-  requireOption(window_events >= 1, "window_events", window_events, "1 or above");
-  requireOption(min_baseline_ratio > 0 && min_baseline_ratio <= 10, "min_baseline_ratio",
-                min_baseline_ratio, "above 0, at most 10");
-  requireOption(min_visible_fraction >= 0 && min_visible_fraction <= 1, "min_visible_fraction",
-                min_visible_fraction, "0 to 1");
+                stride_s, "at most window_s with the policy 'baseline'", {"policy", "window_s"});
 }
 
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
@@ -51,6 +52,17 @@ struct KeyframePolicyOptions {
   double min_visible_fraction = 0.7;
   ReferenceTime reference = ReferenceTime::kMiddle;
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("policy", self.policy);
+    visit("window_s", self.window_s, Allowed::from(1e-6, 1e6, "1e-6 to 1e6"));
+    visit("stride_s", self.stride_s, Allowed::from(1e-6, 1e6, "1e-6 to 1e6"));
+    visit("window_events", self.window_events, Allowed::atLeast(1, "1 or above"));
+    visit("min_baseline_ratio", self.min_baseline_ratio,
+          Allowed::above(0, 10, "above 0, at most 10"));
+    visit("min_visible_fraction", self.min_visible_fraction, Allowed::from(0, 1, "0 to 1"));
+    visit("reference", self.reference);
+  }
   void validate() const;
 };
 

@@ -80,18 +80,6 @@ std::vector<std::vector<WarpedEvent>> warpToDepth(const WindowInput& input,
 
 }  // namespace
 
-void MotionCorrectionOptions::validate() const {
-  requireOption(motion_sigma_m_s > 0 && motion_sigma_m_s <= 10, "motion_sigma_m_s",
-                motion_sigma_m_s, "above 0 and at most 10");
-  requireOption(motion_sigma_deg_s > 0 && motion_sigma_deg_s <= 1000, "motion_sigma_deg_s",
-                motion_sigma_deg_s, "above 0 and at most 1000");
-  requireOption(motion_rounds >= 1 && motion_rounds <= 10, "motion_rounds", motion_rounds,
-                "1 to 10");
-  requireOption(max_events >= 100 && max_events <= 10'000'000, "max_events", max_events,
-                "100 to 10,000,000");
-  requireOption(min_gain >= 0 && min_gain <= 1, "min_gain", min_gain, "0 to 1");
-}
-
 VelocityCorrection findCorrection(const WindowInput& input, const Trajectory& motion,
                                   const cv::Mat1f& depth, const VelocityCorrection& current,
                                   const MotionCorrectionOptions& options) {

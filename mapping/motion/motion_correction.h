@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/motion/event_contrast.h"
@@ -53,7 +54,18 @@ struct MotionCorrectionOptions {
   /// less may be chance. 0 to 1.
   double min_gain = 0.01;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("correct_motion", self.correct_motion);
+    visit("motion_sigma_m_s", self.motion_sigma_m_s,
+          Allowed::above(0, 10, "above 0 and at most 10"));
+    visit("motion_sigma_deg_s", self.motion_sigma_deg_s,
+          Allowed::above(0, 1000, "above 0 and at most 1000"));
+    visit("motion_rounds", self.motion_rounds, Allowed::from(1, 10, "1 to 10"));
+    visit("max_events", self.max_events, Allowed::from(100, 1e7, "100 to 10,000,000").notInFiles());
+    visit("min_gain", self.min_gain, Allowed::from(0, 1, "0 to 1").notInFiles());
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The correction that makes the events of all cameras sharpest, given the depth found along a

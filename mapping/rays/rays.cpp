@@ -196,11 +196,6 @@ std::size_t endOfSegment(EventSpan events, std::size_t begin, const TrajectorySe
 
 }  // namespace
 
-void PosePacketsOptions::validate() const {
-  requireOption(packet_error_px >= 0 && packet_error_px <= 10, "packet_error_px", packet_error_px,
-                "0 to 10");
-}
-
 PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,

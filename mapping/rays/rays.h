@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/event.h"
 #include "mapping/geometry/lens.h"
 #include "mapping/geometry/reference_view.h"
@@ -84,7 +85,11 @@ struct PosePacketsOptions {
   /// has 23.5 instead of 22.7 % wrong points already with 0.05.
   double packet_error_px = 0.02;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("packet_error_px", self.packet_error_px, Allowed::from(0, 10, "0 to 10"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Consecutive events that share one pose.

@@ -21,6 +21,14 @@ struct AutomaticOptions {
   bool window_s = false;
   bool stride_s = false;
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("min_depth_m", self.min_depth_m);
+    visit("max_depth_m", self.max_depth_m);
+    visit("num_planes", self.num_planes);
+    visit("window_s", self.window_s);
+    visit("stride_s", self.stride_s);
+  }
   bool any() const { return min_depth_m || max_depth_m || num_planes || window_s || stride_s; }
 };
 

@@ -35,9 +35,7 @@ std::string namesOfAvailableKernels() {
 }  // namespace
 
 void SpaceSweepOptions::validate() const {
-  constexpr int kMaxThreads = 1024;
-  requireOption(!threads || (*threads >= 1 && *threads <= kMaxThreads), "threads",
-                threads.value_or(0), "1 to 1024");
+  requireFields(*this);
   requireOption(isAvailable(kernelOrFastest()), "kernel", nameOf(kernelOrFastest()),
                 "one that this build and processor have: " + namesOfAvailableKernels());
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/dsi/dsi_columns.h"
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/plane_fusion.h"
@@ -20,6 +21,11 @@ struct SpaceSweepOptions {
   std::optional<int> threads;          ///< 1 to 1024; the number of cores where not given.
   std::optional<VotingKernel> kernel;  ///< An available one; the fastest of them where not given.
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("threads", self.threads, Allowed::from(1, 1024, "1 to 1024"));
+    visit("kernel", self.kernel);
+  }
   void validate() const;
   /// The number of threads that will run: never more than there are cores.
   int threadsOrCores() const;

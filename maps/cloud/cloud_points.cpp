@@ -27,13 +27,6 @@ std::string pointText(const CloudPoint& point) {
   return text.str();
 }
 
-void OutlierRemovalOptions::validate() const {
-  requireOption(outlier_radius_m == 0 || (outlier_radius_m >= 1e-6 && outlier_radius_m <= 1e6),
-                "outlier_radius_m", outlier_radius_m, "0 or from 1e-6 to 1e6 (metres)");
-  requireOption(outlier_min_neighbors >= 1 && outlier_min_neighbors <= 10000,
-                "outlier_min_neighbors", outlier_min_neighbors, "from 1 to 10000");
-}
-
 std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
                                        const OutlierRemovalOptions& options) {
   options.validate();

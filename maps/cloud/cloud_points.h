@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "mapping/base/option.h"
+
 namespace efm {
 
 /// A point on its way into a map, or from a file of any origin. Double, because maps may lie far
@@ -37,7 +39,14 @@ struct OutlierRemovalOptions {
   /// default is that of the published code of EMVS (Rebecq et al., IJCV 2018).
   int outlier_min_neighbors = 3;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("outlier_radius_m", self.outlier_radius_m,
+          Allowed::from(1e-6, 1e6, "0 or from 1e-6 to 1e6 (metres)").orZero());
+    visit("outlier_min_neighbors", self.outlier_min_neighbors,
+          Allowed::from(1, 10'000, "from 1 to 10000"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The points that are not isolated, in the same order. Use it on the cloud of one keyframe before

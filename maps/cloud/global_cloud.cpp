@@ -43,14 +43,6 @@ void appendNumbers(unsigned bits, std::uint64_t checked, std::vector<std::uint64
 
 }  // namespace
 
-void GlobalCloudOptions::validate() const {
-  requireOption(voxel_size_m >= 1e-6 && voxel_size_m <= 1000, "voxel_size_m", voxel_size_m,
-                "from 1e-6 to 1000 (metres)");
-  requireOption(min_keyframes >= 1, "min_keyframes", min_keyframes, "at least 1");
-  outliers.validate();
-  consistency.validate();
-}
-
 bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
   return std::tie(x, y, z) < std::tie(o.x, o.y, o.z);
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/map_point.h"
@@ -26,7 +27,15 @@ struct GlobalCloudOptions {
   /// How keyframes check the points of other keyframes.
   ConsistencyOptions consistency = {};
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("voxel_size_m", self.voxel_size_m,
+          Allowed::from(1e-6, 1000, "from 1e-6 to 1000 (metres)"));
+    visit("min_keyframes", self.min_keyframes, Allowed::atLeast(1, "at least 1"));
+    visit(self.outliers);
+    visit(self.consistency);
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The map: the points of all keyframes in the world, one per occupied voxel.

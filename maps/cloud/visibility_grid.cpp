@@ -23,15 +23,6 @@ std::string_view nameOf(Consistency consistency) { return nameIn(kConsistencies,
 
 Consistency consistencyFromName(std::string_view name) { return valueIn(kConsistencies, name); }
 
-void ConsistencyOptions::validate() const {
-  requireOption(consistency_tolerance >= 0.001 && consistency_tolerance <= 1,
-                "consistency_tolerance", consistency_tolerance, "from 0.001 to 1");
-  requireOption(consistency_cell_deg >= 0.01 && consistency_cell_deg <= 10, "consistency_cell_deg",
-                consistency_cell_deg, "from 0.01 to 10 (degrees)");
-  requireOption(max_contradictions >= 0 && max_contradictions <= 16, "max_contradictions",
-                max_contradictions, "from 0 to 16");
-}
-
 namespace {
 
 /// The maximum of |x| / z and |y| / z in a view.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_points.h"
 
@@ -38,7 +39,16 @@ struct ConsistencyOptions {
   /// A point without support is excluded where it has more free-space violations. Range: 0 to 16.
   int max_contradictions = 0;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("consistency", self.consistency);
+    visit("consistency_tolerance", self.consistency_tolerance,
+          Allowed::from(0.001, 1, "from 0.001 to 1"));
+    visit("consistency_cell_deg", self.consistency_cell_deg,
+          Allowed::from(0.01, 10, "from 0.01 to 10 (degrees)"));
+    visit("max_contradictions", self.max_contradictions, Allowed::from(0, 16, "from 0 to 16"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// What a keyframe finds about a point of another one.

@@ -19,12 +19,6 @@ std::string sizeText(const cv::Mat& image) {
 
 }  // namespace
 
-void DepthPairingOptions::validate() const {
-  requireOption(tolerance_px >= 0 && tolerance_px <= 100, "tolerance_px", tolerance_px,
-                "from 0 to 100 (pixels)");
-  requireOption(max_depth_m > 0, "max_depth_m", max_depth_m, "above 0 (metres)");
-}
-
 void ComparedDepths::validate() const {
   if (estimate.size() != truth.size()) {
     throw std::invalid_argument("the maps differ in size: the estimate has " + sizeText(estimate) +

@@ -10,6 +10,8 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
+
 namespace efm {
 
 /// The estimate and the truth of a pixel, z-depths in metres.
@@ -26,7 +28,12 @@ struct DepthPairingOptions {
   /// Farther truths are ignored. Above 0.
   double max_depth_m = std::numeric_limits<double>::infinity();
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("tolerance_px", self.tolerance_px, Allowed::from(0, 100, "from 0 to 100 (pixels)"));
+    visit("max_depth_m", self.max_depth_m, Allowed::above(0, "above 0 (metres)"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Whether a pixel of a depth map (metres) has a depth: finite and above 0.

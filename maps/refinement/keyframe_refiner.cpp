@@ -12,17 +12,6 @@
 
 namespace efm {
 
-void RefinementOptions::validate() const {
-  tracker.validate();
-  points.validate();
-  registration.validate();
-  loop.validate();
-  graph.validate();
-  requireOption(window >= 1 && window <= 1000, "window", window, "from 1 to 1000 (keyframes)");
-  requireOption(map_keyframes >= 1 && map_keyframes <= 100, "map_keyframes", map_keyframes,
-                "from 1 to 100");
-}
-
 namespace {
 
 /// Loops are solved again when the map has grown by this part of their length: 1 / 20.

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_graph.h"
 #include "maps/refinement/keyframe_registration.h"
@@ -31,7 +32,18 @@ struct RefinementOptions {
   LoopOptions loop;
   PoseGraphOptions graph;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("window", self.window, Allowed::from(1, 1000, "from 1 to 1000 (keyframes)"));
+    visit("map_keyframes", self.map_keyframes, Allowed::from(1, 100, "from 1 to 100"));
+    visit(self.points);
+    visit(self.tracker);
+    visit("adapt_tracker", self.adapt_tracker);
+    visit(self.registration);
+    visit(self.loop);
+    visit(self.graph);
+  }
+  void validate() const { requireFields(*this); }
 };
 
 struct LoopCounts {

@@ -155,11 +155,10 @@ void summarize(const Neighbours& found, const std::vector<MapKeyframe>& map, std
 }  // namespace
 
 void KeyframeRegistrationOptions::validate() const {
-  requireOption(last_distance_px > 0 && last_distance_px <= 1e4, "last_distance_px",
-                last_distance_px, "above 0, at most 10000 (pixels)");
+  requireFields(*this);
   requireOption(first_distance_px >= last_distance_px && first_distance_px <= 1e4,
-                "first_distance_px", first_distance_px, "from last_distance_px to 10000 (pixels)");
-  alignment.validate();
+                "first_distance_px", first_distance_px, "from last_distance_px to 10000 (pixels)",
+                {"last_distance_px"});
 }
 
 double Registration::inlierRatio() const {

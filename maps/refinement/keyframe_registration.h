@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
 #include "maps/refinement/registration_points.h"
@@ -20,6 +21,13 @@ struct KeyframeRegistrationOptions {
   /// Converged to a thousandth only, because the neighbours change afterwards.
   AlignmentOptions alignment{3, 10, 1e-3};
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit(self.alignment);
+    visit("first_distance_px", self.first_distance_px);
+    visit("last_distance_px", self.last_distance_px,
+          Allowed::above(0, 1e4, "above 0, at most 10000 (pixels)"));
+  }
   void validate() const;
 };
 

@@ -65,18 +65,6 @@ bool isPlausible(const Registration& registration, const LoopOptions& options) {
 
 }  // namespace
 
-void LoopOptions::validate() const {
-  requireOption(loop_min_overlap > 0 && loop_min_overlap <= 1, "loop_min_overlap", loop_min_overlap,
-                "above 0, at most 1");
-  requireOption(loop_min_inliers >= 0 && loop_min_inliers <= 1, "loop_min_inliers",
-                loop_min_inliers, "from 0 to 1");
-  requireOption(loop_max_sigma_m > 0, "loop_max_sigma_m", loop_max_sigma_m, "above 0");
-  requireOption(loop_max_sigma_rad > 0, "loop_max_sigma_deg",
-                loop_max_sigma_rad / kRadiansPerDegree, "above 0");
-  requireOption(loop_checks >= 0 && loop_checks <= 100, "loop_checks", loop_checks,
-                "from 0 to 100");
-}
-
 double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in,
                    const Rigid3& T_in_of) {
   std::size_t checked = 0;

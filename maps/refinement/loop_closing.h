@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_registration.h"
 #include "maps/refinement/tracker_model.h"
@@ -23,7 +24,17 @@ struct LoopOptions {
   double loop_max_sigma_rad = 0.5 * kRadiansPerDegree;
   int loop_checks = 1;  ///< Candidates that are registered per keyframe, 0 to 100.
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("loops", self.loops);
+    visit("loop_min_overlap", self.loop_min_overlap, Allowed::above(0, 1, "above 0, at most 1"));
+    visit("loop_min_inliers", self.loop_min_inliers, Allowed::from(0, 1, "from 0 to 1"));
+    visit("loop_max_sigma_m", self.loop_max_sigma_m, Allowed::above(0, "above 0"));
+    visit("loop_max_sigma_deg", self.loop_max_sigma_rad,
+          Allowed::above(0, "above 0").in(kRadiansPerDegree));
+    visit("loop_checks", self.loop_checks, Allowed::from(0, 100, "from 0 to 100"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Two keyframes that may see the same place.

@@ -254,17 +254,7 @@ class GraphProblem {
   ceres::Problem problem_;  // last, because it points to the others
 };
 
-void requireSolver(double robust_sigmas, int max_iterations) {
-  requireOption(robust_sigmas > 0 && robust_sigmas <= 1e3, "robust_sigmas", robust_sigmas,
-                "above 0, at most 1000");
-  requireOption(max_iterations >= 1 && max_iterations <= 1000, "max_iterations", max_iterations,
-                "from 1 to 1000");
-}
-
 }  // namespace
-
-void AlignmentOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
-void PoseGraphOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
 
 std::optional<Rigid3> alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
                                  const Rigid3& T_map_start, const AlignmentOptions& options) {

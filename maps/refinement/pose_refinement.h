@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
@@ -74,7 +75,13 @@ struct AlignmentOptions {
   /// to 1.
   double min_gain = 1e-8;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("robust_sigmas", self.robust_sigmas, Allowed::above(0, 1e3, "above 0, at most 1000"));
+    visit("max_iterations", self.max_iterations,
+          Allowed::from(1, 1000, "from 1 to 1000").notInFiles());
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// The pose that aligns the points of a keyframe with those of the map: the minimum of the sum of
@@ -122,7 +129,14 @@ struct PoseGraphOptions {
   double robust_sigmas = 3;  ///< For robust factors, as in AlignmentOptions.
   int max_iterations = 20;   ///< 1 to 1000.
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("robust_sigmas", self.robust_sigmas,
+          Allowed::above(0, 1e3, "above 0, at most 1000").notInFiles());
+    visit("max_iterations", self.max_iterations,
+          Allowed::from(1, 1000, "from 1 to 1000").notInFiles());
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Moves the poses that are not fixed to the minimum of the sum of squared errors.

@@ -154,16 +154,9 @@ bool isUsable(const RegistrationPoint& point) {
 }  // namespace
 
 void RegistrationCloudOptions::validate() const {
-  requireOption(max_points >= 10 && max_points <= 100000, "max_points", max_points,
-                "from 10 to 100000");
+  requireFields(*this);
   requireOption(max_map_points >= max_points && max_map_points <= 1000000, "max_map_points",
-                max_map_points, "from max_points to 1000000");
-  requireOption(pixel_sigma > 0 && pixel_sigma <= 100, "pixel_sigma", pixel_sigma,
-                "above 0, at most 100 (pixels)");
-  requireOption(depth_sigmas >= 1 && depth_sigmas <= 1000, "depth_sigmas", depth_sigmas,
-                "from 1 to 1000");
-  requireOption(neighbourhood_px >= 1 && neighbourhood_px <= 20, "neighbourhood_px",
-                neighbourhood_px, "from 1 to 20 (pixels)");
+                max_map_points, "from max_points to 1000000", {"max_points"});
 }
 
 RegistrationPoints selectPoints(const KeyframeDepthMap& keyframe,

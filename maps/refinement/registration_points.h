@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/cloud_points.h"
 
@@ -31,6 +32,16 @@ struct RegistrationCloudOptions {
   /// Half the side of the neighbourhood whose shape a point represents, pixels. Range: 1 to 20.
   int neighbourhood_px = 3;
 
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("max_points", self.max_points, Allowed::from(10, 100'000, "from 10 to 100000"));
+    visit("max_map_points", self.max_map_points);
+    visit("pixel_sigma", self.pixel_sigma,
+          Allowed::above(0, 100, "above 0, at most 100 (pixels)").notInFiles());
+    visit("depth_sigmas", self.depth_sigmas, Allowed::from(1, 1000, "from 1 to 1000").notInFiles());
+    visit("neighbourhood_px", self.neighbourhood_px,
+          Allowed::from(1, 20, "from 1 to 20 (pixels)").notInFiles());
+  }
   void validate() const;
 };
 

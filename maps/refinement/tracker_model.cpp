@@ -61,16 +61,6 @@ TrackerErrors scaled(TrackerErrors errors, const LogRatios& log_ratios) {
 
 }  // namespace
 
-void TrackerErrors::validate() const {
-  const auto require = [](const char* name, double value, double unit = 1) {
-    requireOption(value >= 0 && value <= 1e3 * unit, name, value / unit, "from 0 to 1000");
-  };
-  require("tracker_noise_m", noise_m);
-  require("tracker_noise_deg", noise_rad, kRadiansPerDegree);
-  require("tracker_drift", drift_m);
-  require("tracker_drift_deg_per_m", drift_rad, kRadiansPerDegree);
-}
-
 Matrix6d TrackerErrors::noiseCovariance(const NoiseScale& scale) const {
   const double sigma_m = scale.translation * noise_m;
   const double sigma_rad = scale.rotation * noise_rad;

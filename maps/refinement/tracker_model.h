@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
 #include "maps/refinement/registration_points.h"
@@ -29,7 +30,15 @@ struct TrackerErrors {
   double drift_m = 0.01;  ///< Per metre of path.
   double drift_rad = 0.5 * kRadiansPerDegree;
 
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    const Allowed range = Allowed::from(0, 1000, "from 0 to 1000");
+    visit("tracker_noise_m", self.noise_m, range);
+    visit("tracker_noise_deg", self.noise_rad, range.in(kRadiansPerDegree));
+    visit("tracker_drift", self.drift_m, range);
+    visit("tracker_drift_deg_per_m", self.drift_rad, range.in(kRadiansPerDegree));
+  }
+  void validate() const { requireFields(*this); }
   /// The covariance of a pose relative to the pose without noise. Never singular.
   Matrix6d noiseCovariance(const NoiseScale& scale = {}) const;
   /// The covariance of the motion without noise along a path. Never singular.

@@ -249,7 +249,7 @@ class MapCommand {
   void endTimes(const KeyframeWriter& writer);
   /// Writes the report, and prints the warnings, the summary and the error.
   /// @return the exit status.
-  int conclude(std::optional<std::string> error);
+  int conclude(std::optional<UserError> error);
   /// Within a handler: throws the error again, in the words of the user.
   /// @param written the keyframes that are in the folder.
   [[noreturn]] void rethrow(int written) const;
@@ -260,7 +260,7 @@ class MapCommand {
   std::string stays() const;
 
   std::size_t printed_warnings_ = 0;
-  std::optional<std::string> write_error_;
+  std::optional<UserError> write_error_;
   const double start_cpu_s_ = processSeconds();
   std::chrono::steady_clock::time_point began_;
 };
@@ -361,7 +361,7 @@ void MapCommand::write(const std::function<void()>& file) {
   try {
     file();
   } catch (const std::exception& error) {
-    if (!write_error_) write_error_ = inWords(error);
+    if (!write_error_) write_error_ = userError(error);
   }
 }
 
@@ -407,7 +407,7 @@ std::string MapCommand::stays() const {
   return fmt::format("; the earlier result in {} stays", output->folder().string());
 }
 
-int MapCommand::conclude(std::optional<std::string> error) {
+int MapCommand::conclude(std::optional<UserError> error) {
   if (!error) error = write_error_;
   report.peak_memory_bytes = peakMemoryBytes();
   // A run without a keyframe, or one that cannot write a file, leaves the result of an earlier run.
@@ -416,7 +416,7 @@ int MapCommand::conclude(std::optional<std::string> error) {
     write([&] { output->writeReport(reportJson(report)); });
     if (!error) error = write_error_;
   }
-  if (output->keepsEarlier() && error) *error += stays();
+  if (output->keepsEarlier() && error) error->add(stays());
   printWarnings({report.warnings.begin() + static_cast<std::ptrdiff_t>(printed_warnings_),
                  report.warnings.end()});
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
@@ -424,8 +424,9 @@ int MapCommand::conclude(std::optional<std::string> error) {
     std::cout << summaryOf(report, kind, output->folder());
   }
   if (error) {
-    if (const auto wrong = reader.wrongOption(*error)) return fail(*wrong, kUsageStatus);
-    return fail(reader.withOrigins(*error));
+    const auto wrong = error->wrong ? reader.wrongOption(*error->wrong) : std::nullopt;
+    if (wrong) return fail(*wrong + error->more, kUsageStatus);
+    return fail(error->text + reader.origins(error->options));
   }
   if (report.stopped_at) {
     std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
@@ -442,8 +443,8 @@ void MapCommand::rethrow(int written) const {
     throw;
   } catch (const Interrupted&) {
     throw;
-  } catch (const std::invalid_argument& error) {  // it may be about an option that was given
-    if (const auto wrong = reader.wrongOption(error.what())) throw UsageError(*wrong);
+  } catch (const OptionError& error) {
+    if (const auto wrong = reader.wrongOption(error)) throw UsageError(*wrong);
     throw;
   } catch (const std::runtime_error& error) {
     if (output && output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays());

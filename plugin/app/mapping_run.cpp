@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/app/program.h"
 #include "plugin/app/recording_interval.h"
 
 namespace efm {
@@ -43,11 +42,20 @@ bool MappingRun::attempt(const Step& step) {
   try {
     more = step();
   } catch (const std::exception& caught) {
-    if (!error_) error_ = inWords(caught);
+    if (!error_) noteError(caught);
   }
   deliverMade();
   if (receive_error_) std::rethrow_exception(receive_error_);
   return more;
+}
+
+/// The mapper's errors about a sample get its place. Without a section they are not about options
+/// then: the sample has a calibration of its own.
+void MappingRun::noteError(const std::exception& caught) {
+  error_ = userError(caught);
+  if (!rejected_) return;
+  error_->text = recording_.position() + ": " + error_->text;
+  if (error_->wrong && error_->wrong->section.empty()) error_->wrong.reset();
 }
 
 bool MappingRun::mapNext() {
@@ -72,8 +80,9 @@ bool MappingRun::feedNext() {
   if (std::holds_alternative<PoseSample>(*sample)) first_.statistics.add(*sample);
   try {
     mapper_->add(std::move(*sample));
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(recording_.position() + ": " + error.what());
+  } catch (const std::invalid_argument&) {
+    rejected_ = true;
+    throw;
   }
   return true;
 }
@@ -206,8 +215,8 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   const FusionMapperOptions& options = options_.mapper;
   const DepthPlanesOptions& planes = options.keyframe.planes;
   if (error_ && status.events) {
-    *error_ +=
-        "; events were read until " + timeText(status.events->last_ns, status.events->first_ns);
+    error_->add("; events were read until " +
+                timeText(status.events->last_ns, status.events->first_ns));
   }
   status.counts.sorted_events += read.sorted_events;
   report.skipped_events = read.skipped_events;
@@ -240,9 +249,13 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   if (status.counts.event_uses > 0 || error_ || stopped) return;
   const bool outside = !status.events && !recording_.rig().cameras.empty() &&
                        (options.interval().t0_ns || options.interval().t1_ns);
-  error_ = status.counts.keyframes > 0 ? "no event of the keyframes' windows could be used"
-           : outside ? "there is no keyframe: " + noEventText(options.interval(), read)
-                     : "there is no keyframe: " + whyNoKeyframe(status, options);
+  if (status.counts.keyframes > 0) {
+    error_ = {"no event of the keyframes' windows could be used"};
+    return;
+  }
+  const OptionHint why =
+      outside ? noEventText(options.interval(), read) : whyNoKeyframe(status, options);
+  error_ = {std::string("there is no keyframe: ") + why.what(), why.options};
 }
 
 // --- A recording that is read twice --------------------------------------------------------------

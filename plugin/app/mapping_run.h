@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin/app/program.h"
 #include "plugin/app/progress.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/map_watcher.h"
@@ -56,7 +57,7 @@ class MappingRun {
   double seconds() const { return progress_.seconds(); }
 
   /// The damage of the recording, or why there is no keyframe; std::nullopt if the map is complete.
-  const std::optional<std::string>& error() const { return error_; }
+  const std::optional<UserError>& error() const { return error_; }
   /// Adds what the run found to a report, which has the warnings and doubts of the first look. To
   /// be called once, after `finish`.
   /// @param stopped the user ended the run.
@@ -65,6 +66,7 @@ class MappingRun {
  private:
   template <typename Step>
   bool attempt(const Step& step);
+  void noteError(const std::exception& caught);
   bool feedNext();
   void deliver(const KeyframeDepthMap& keyframe);
   void deliverMade();
@@ -80,7 +82,8 @@ class MappingRun {
   StageTimes reading_;
   DepthStatistics depths_;
   std::exception_ptr receive_error_;
-  std::optional<std::string> error_;
+  std::optional<UserError> error_;
+  bool rejected_ = false;                 // a sample, by the mapper
   std::mutex made_mutex_;                 // of made_
   std::vector<KeyframeDepthMap> made_;    // in live operation, not delivered
   std::optional<std::int64_t> first_ns_;  // in live operation, of the first sample

@@ -63,21 +63,28 @@ bool isOutOfMemory(std::string_view text) {
 
 }  // namespace
 
-std::string inWords(const std::exception& error) {
+UserError userError(const std::exception& error) {
   if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
     const std::string to = file->path2().empty() ? "" : " to " + file->path2().string();
     const std::string why = reasonNotWritten(file->code().value());
-    return file->path1().string() + to + ": " + (why.empty() ? file->code().message() : why);
+    return {file->path1().string() + to + ": " + (why.empty() ? file->code().message() : why)};
   }
   const auto* opencv = dynamic_cast<const cv::Exception*>(&error);
-  if (opencv != nullptr && opencv->code != cv::Error::StsNoMem) return onOneLine(opencv->err);
-  if (opencv != nullptr || isOutOfMemory(error.what())) return kOutOfMemory;
+  if (opencv != nullptr && opencv->code != cv::Error::StsNoMem) return {onOneLine(opencv->err)};
+  if (opencv != nullptr || isOutOfMemory(error.what())) {
+    return {kOutOfMemory, {{"dsi", "num_planes"}, {"dsi", "width"}}};
+  }
   if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
-    return "the system refuses: " + system->code().message();  // a thread, for instance
+    return {"the system refuses: " + system->code().message()};  // a thread, for instance
   }
   const std::string text = withoutPlace(error.what());
-  return text == error.what() ? text : onOneLine(text);
+  UserError result{text == error.what() ? text : onOneLine(text)};
+  if (const auto* hint = dynamic_cast<const OptionHint*>(&error)) result.options = hint->options;
+  if (const auto* wrong = dynamic_cast<const OptionError*>(&error)) result.wrong = *wrong;
+  return result;
 }
+
+std::string inWords(const std::exception& error) { return userError(error).text; }
 
 namespace {
 

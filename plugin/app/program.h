@@ -2,8 +2,12 @@
 #pragma once
 
 #include <exception>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include "mapping/base/option.h"
 
 namespace efm {
 
@@ -31,7 +35,21 @@ auto asUsage(const Step& step) {
 /// Prints an error to stderr, "event-fusion: error: …". @return the status.
 int fail(const std::string& message, int status = kFailedStatus);
 
-/// An exception in words for the user: one sentence, without what a library adds for its
+/// An error in words for the user, and what it says of options.
+struct UserError {
+  std::string text;
+  std::vector<OptionId> options{};     ///< Those that the text names.
+  std::optional<OptionError> wrong{};  ///< The value that is out of range.
+  std::string more{};                  ///< The end of the text, behind the error itself.
+
+  void add(const std::string& end) {
+    text += end;
+    more += end;
+  }
+};
+UserError userError(const std::exception& error);
+
+/// The text alone: one sentence, without what a library adds for its
 /// programmers (call stacks, places in its sources, names of types).
 std::string inWords(const std::exception& error);
 

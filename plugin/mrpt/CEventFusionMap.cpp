@@ -22,6 +22,7 @@
 #include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/options/option_keys.h"
 
 MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusionMap)
 

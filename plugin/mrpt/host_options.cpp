@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "plugin/options/option_keys.h"
+
 namespace efm {
 namespace {
 

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"
+#include "plugin/options/option_keys.h"
 
 namespace efm {
 namespace {
@@ -44,25 +44,10 @@ std::string keyText(const OptionOrigin& origin, std::string_view section, std::s
 
 /// What an error says of an unknown key.
 std::string unknownKey(std::string_view section, std::string_view key) {
-  for (const OptionKey& entry : optionKeys()) {
-    if (entry.key == key) return fmt::format("unknown key: it is one of [{}]", entry.section);
+  for (const NamedOption& option : listOptions({})) {
+    if (option.key == key) return fmt::format("unknown key: it is one of [{}]", option.section);
   }
   return "unknown key: " + expectedName(key, optionKeysOf(section));
-}
-
-bool isWordCharacter(char c) {
-  return c == '_' || std::isalnum(static_cast<unsigned char>(c)) != 0;
-}
-
-/// Whether a text has a word.
-bool mentions(std::string_view text, std::string_view word) {
-  for (std::size_t at = text.find(word); at != std::string_view::npos;
-       at = text.find(word, at + 1)) {
-    const std::size_t end = at + word.size();
-    const bool begins = at == 0 || !isWordCharacter(text[at - 1]);
-    if (begins && (end == text.size() || !isWordCharacter(text[end]))) return true;
-  }
-  return false;
 }
 
 bool startsComment(std::string_view text) {
@@ -96,7 +81,7 @@ void OptionReader::readText(std::string_view text, const std::string& name) {
 
 void OptionReader::readLines(std::string_view text, const OptionOrigin& file) {
   text = withoutByteOrderMark(text);
-  std::map<std::pair<std::string, std::string>, int> lines;  // of this text
+  std::map<OptionId, int> lines;  // of this text
   std::string section;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
@@ -147,22 +132,18 @@ void OptionReader::set(std::string_view section, std::string_view key, std::stri
 
 void OptionReader::assign(std::string_view section, std::string_view key, std::string_view value,
                           const OptionOrigin& origin) {
-  const auto& keys = optionKeys();
-  const auto entry = std::find_if(keys.begin(), keys.end(), [&](const OptionKey& candidate) {
-    return candidate.section == section && candidate.key == key;
-  });
-  if (entry == keys.end()) {
+  const char* const equals = origin.name == kSet ? "=" : " = ";
+  const std::string text = keyText(origin, section, key) + equals + printable(value);
+  bool known = false;
+  try {
+    known = setOption(options_, section, key, value, origin.folder);
+  } catch (const std::invalid_argument& error) {
+    refuse("{}: {}", text, error.what());
+  }
+  if (!known) {
     const std::string_view former = formerOptionError(section, key);
     refuse("{}: {}", keyText(origin, section, key),
            former.empty() ? unknownKey(section, key) : std::string(former));
-  }
-  const char* const equals = origin.name == kSet ? "=" : " = ";
-  const std::string text = keyText(origin, section, key) + equals + printable(value);
-  try {
-    const std::filesystem::path path = origin.folder / value;
-    entry->read(options_, entry->is_path && !value.empty() ? path.native() : value);
-  } catch (const std::invalid_argument& error) {
-    refuse("{}: {}", text, error.what());
   }
   given_[{std::string(section), std::string(key)}] = {text, ++assignments_};
 }
@@ -171,72 +152,55 @@ EventFusionOptions OptionReader::options() const {
   EventFusionOptions options = options_;
   fitAutomatic(options.automatic, options.mapper);
   try {
-    options.mapper.validate();
-    options.cloud.validate();
-    options.refinement.validate();
-    options.live.validate();
-  } catch (const std::invalid_argument& error) {
-    // The structs say "key = value: must be ..."; they know neither sections nor files.
-    const std::string message = error.what();
-    const std::size_t equals = message.find(" = ");
-    const std::size_t colon = message.find(": ", equals);
-    if (colon == std::string::npos) throw;
-    for (const OptionKey& entry : optionKeys()) {
-      if (entry.key != message.substr(0, equals)) continue;
-      refuseOutOfRange(entry, message.substr(0, colon), message.substr(colon + 2));
-    }
-    throw;
+    options.validate();
+  } catch (const OptionError& error) {  // the structs know neither sections nor files
+    refuseOutOfRange(error);
   }
   return options;
 }
 
-/// @param value "key = value".
-void OptionReader::refuseOutOfRange(const OptionKey& entry, const std::string& value,
-                                    const std::string& expected) const {
-  const auto find = [this](const OptionKey& key) {
-    const auto found = given_.find({std::string(key.section), std::string(key.key)});
+void OptionReader::refuseOutOfRange(const OptionError& error) const {
+  const std::vector<NamedOption> all = listOptions(options_);
+  const auto named = [&](std::string_view key) {
+    return std::find_if(all.begin(), all.end(),
+                        [&](const NamedOption& option) { return option.key == key; });
+  };
+  const auto find = [&](const NamedOption& option) {
+    const auto found = given_.find({std::string(option.section), std::string(option.key)});
     return found == given_.end() ? Given() : found->second;
   };
-  const Given own = find(entry);
+  const auto option = named(error.key);
+  if (option == all.end()) throw error;
+  const Given own = find(*option);
   const std::string own_text =
-      own.order > 0 ? own.text : fmt::format("default: [{}] {}", entry.section, value);
+      own.order > 0 ? own.text
+                    : fmt::format("default: [{}] {} = {}", option->section, error.key, error.value);
   std::string others;
-  for (const OptionKey& other : optionKeys()) {
-    if (other.section != entry.section || other.key == entry.key) continue;
-    if (!mentions(expected, other.key)) continue;
+  for (const std::string& key : error.other_keys) {
+    const NamedOption& other = *named(key);
     const Given given = find(other);
     if (given.order > own.order) {
-      refuse("{}: contradicts {}, which {}", given.text, own_text, expected);
+      refuse("{}: contradicts {}, which must be {}", given.text, own_text, error.expected);
     }
-    others += fmt::format(" ({})", given.order > 0 ? given.text
-                                                   : fmt::format("{} = {} by default", other.key,
-                                                                 textOf(other.value(options_))));
+    others += fmt::format(
+        " ({})",
+        given.order > 0 ? given.text : fmt::format("{} = {} by default", key, textOf(other.value)));
   }
-  refuse("{}: {}{}", own_text, expected, others);
+  refuse("{}: must be {}{}", own_text, error.expected, others);
 }
 
-std::string OptionReader::withOrigins(std::string error) const {
-  const std::string said = error;
-  for (const auto& [name, given] : given_) {
-    const std::string shown = fmt::format("[{}] {}", name.first, name.second);
-    if (mentions(said, shown)) error += " (" + given.text + ")";
+std::string OptionReader::origins(const std::vector<OptionId>& options) const {
+  std::string text;
+  for (const auto& [option, given] : given_) {
+    if (std::count(options.begin(), options.end(), option) > 0) text += " (" + given.text + ")";
   }
-  return error;
+  return text;
 }
 
-std::optional<std::string> OptionReader::wrongOption(const std::string& error) const {
-  for (const auto& [name, given] : given_) {
-    const std::string section = fmt::format("[{}] ", name.first);
-    std::size_t begin = error.find(section + name.second + " ");
-    if (begin != std::string::npos) {
-      begin += section.size();
-    } else if (error.rfind(name.second + " = ", 0) == 0) {
-      begin = 0;
-    } else {
-      continue;
-    }
-    if (error.find(": must be ", begin) == std::string::npos) continue;
-    return given.text + ": " + error.substr(begin);
+std::optional<std::string> OptionReader::wrongOption(const OptionError& error) const {
+  for (const auto& [option, given] : given_) {
+    const bool same_section = error.section.empty() || error.section == option.first;
+    if (same_section && error.key == option.second) return given.text + ": " + error.sentence;
   }
   return std::nullopt;
 }

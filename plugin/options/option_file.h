@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
+#include <vector>
 
-#include "plugin/options/option_keys.h"
+#include "mapping/base/option.h"
 #include "plugin/session/event_fusion_options.h"
 
 namespace efm {
@@ -56,27 +56,26 @@ class OptionReader {
   /// Where and how an option was given: "rig.ini:3: [dsi] num_planes = 0", or
   /// "--set dsi.num_planes=0". Empty if it was not given.
   std::string given(std::string_view section, std::string_view key) const;
-  /// An error about options, "… [rig] cameras …", with where and how they were given.
-  std::string withOrigins(std::string error) const;
-  /// An error that says of an option that was given, "[rig] cameras = 5: must be …", or
-  /// "cameras = 5: must be …" in the beginning: it then begins with where and how it was given.
-  /// Nothing for other errors.
-  std::optional<std::string> wrongOption(const std::string& error) const;
+  /// Where and how those of the options were given that were given: " (rig.ini:3: [dsi] width =
+  /// 9)".
+  std::string origins(const std::vector<OptionId>& options) const;
+  /// The error, without its section, behind where and how its option was given. std::nullopt if it
+  /// was not given.
+  std::optional<std::string> wrongOption(const OptionError& error) const;
 
  private:
   void readLines(std::string_view text, const OptionOrigin& file);
   void assign(std::string_view section, std::string_view key, std::string_view value,
               const OptionOrigin& origin);
 
-  [[noreturn]] void refuseOutOfRange(const OptionKey& entry, const std::string& value,
-                                     const std::string& expected) const;
+  [[noreturn]] void refuseOutOfRange(const OptionError& error) const;
 
   struct Given {
     std::string text;
     int order = 0;  // the n-th of all
   };
   EventFusionOptions options_;
-  std::map<std::pair<std::string, std::string>, Given> given_;  // of (section, key)
+  std::map<OptionId, Given> given_;
   int assignments_ = 0;
 };
 

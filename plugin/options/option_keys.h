@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <variant>
 #include <vector>
 
-#include "mapping/depth/depth_extraction.h"
-#include "mapping/events/window.h"
-#include "mapping/keyframes/keyframe_policy.h"
-#include "mapping/sweep/space_sweep.h"
-#include "maps/cloud/visibility_grid.h"
+#include "mapping/base/option.h"
 #include "plugin/session/event_fusion_options.h"
 
 namespace efm {
@@ -27,58 +20,81 @@ using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 /// The text for a file: numbers have the fewest digits that read back the same.
 std::string textOf(const OptionValue& value);
 
-/// Reads a field from the text of a file.
-void parseInto(std::string_view text, double& field);
-void parseInto(std::string_view text, int& field);
-void parseInto(std::string_view text, std::int64_t& field);
-void parseInto(std::string_view text, std::uint32_t& field);
-void parseInto(std::string_view text, bool& field);
-void parseInto(std::string_view text, std::string& field);
-void parseInto(std::string_view text, std::filesystem::path& field);
-void parseInto(std::string_view text, std::vector<int>& field);
-void parseInto(std::string_view text, Eigen::Vector3d& field);
-void parseInto(std::string_view text, MaxConfidence& field);
-/// Nanoseconds from seconds, exactly.
-void parseInto(std::string_view text, std::vector<std::int64_t>& field);
-void parseInto(std::string_view text, KeyframePolicyKind& field);
-void parseInto(std::string_view text, ReferenceTime& field);
-void parseInto(std::string_view text, PlaneSpacing& field);
-void parseInto(std::string_view text, FusionRule& field);
-void parseInto(std::string_view text, FusionOrder& field);
-void parseInto(std::string_view text, SubintervalSplit& field);
-void parseInto(std::string_view text, SubintervalShuffle& field);
-void parseInto(std::string_view text, ExtractionMethod& field);
-void parseInto(std::string_view text, VotingKernel& field);
-void parseInto(std::string_view text, Consistency& field);
+/// Calls `use` with the section and what the lines of option structs say.
+template <typename Use>
+struct OptionLines {
+  const Use& use;
+  std::string_view section = {};
 
-/// The value of a field, which reads back the same.
-OptionValue valueOf(double field);
-OptionValue valueOf(int field);
-OptionValue valueOf(std::int64_t field);
-OptionValue valueOf(std::uint32_t field);
-OptionValue valueOf(bool field);
-OptionValue valueOf(const std::vector<int>& field);
-OptionValue valueOf(const std::string& field);
-OptionValue valueOf(const Eigen::Vector3d& field);
-OptionValue valueOf(const MaxConfidence& field);
-OptionValue valueOf(const std::filesystem::path& field);
-OptionValue valueOf(const std::vector<std::int64_t>& times_ns);
-template <typename Enum, typename = std::enable_if_t<std::is_enum_v<Enum>>>
-OptionValue valueOf(Enum field) {
-  return std::string(nameOf(field));
-}
-
-/// One key: the functions that read its field from text and return its value.
-struct OptionKey {
-  std::string_view section;
-  std::string_view key;
-  std::function<void(EventFusionOptions&, std::string_view)> read;
-  std::function<OptionValue(const EventFusionOptions&)> value;
-  bool is_path = false;
+  template <typename Field>
+  void operator()(std::string_view key, Field& field, const Allowed& allowed = {}) const {
+    use(section, key, field, allowed);
+  }
+  template <typename Part>
+  void operator()(Part& part) const {
+    std::remove_const_t<Part>::fields(part, *this);
+  }
 };
 
-/// The table of all options. Reading, overriding and reporting use it alone, and so cannot differ.
-const std::vector<OptionKey>& optionKeys();
+/// Calls `use` with the section, key, field and range of all options, in the order of the files.
+/// What reads, sets and lists options uses it alone, and so cannot differ.
+template <typename Options, typename Use>
+void visitOptions(Options& options, const Use& use) {
+  OptionLines<Use> visit{use};
+  auto& mapper = options.mapper;
+  auto& keyframe = mapper.keyframe;
+
+  visit.section = "rig";
+  visit("calibration", options.rig.calibration);
+  visit("hand_eye", options.rig.hand_eye);
+  visit("cameras", mapper.cameras);
+  visit("time_offsets_s", options.rig.time_offsets_ns);
+  visit("pose_source", options.rig.pose_source);
+  visit(mapper.trajectory);
+  visit("exclude_silent", keyframe.exclude_silent);
+
+  visit.section = "keyframes";
+  visit(mapper.policy);
+  visit("max_events_per_camera", keyframe.max_events_per_camera);
+
+  visit.section = "dsi";
+  visit(keyframe.planes);
+  visit("reference_camera", keyframe.reference_camera);
+  visit(keyframe.view);
+
+  visit.section = "fusion";
+  visit(keyframe.sweep.fusion);
+  visit(keyframe.subintervals);
+  visit(keyframe.split);
+  visit("late", options.late_fusion);
+
+  visit.section = "depth";
+  visit(keyframe.extraction);
+
+  visit.section = "map";
+  visit(options.cloud);
+
+  visit.section = "filter";
+  visit(mapper.filter);
+
+  visit.section = "refinement";
+  visit("enabled", options.refinement.enabled);
+  visit("background", options.refinement.background);
+  visit(options.refinement.refiner);
+  visit(keyframe.motion);
+
+  visit.section = "live";
+  visit(options.live);
+
+  visit.section = "output";
+  visit("camera_maps", keyframe.camera_maps);
+  visit("event_images", keyframe.event_images);
+  visit("ply", options.ply);
+
+  visit.section = "performance";
+  visit(keyframe.sweep);
+  visit(keyframe.packets);
+}
 
 /// One option as the files name it.
 struct NamedOption {
@@ -87,8 +103,13 @@ struct NamedOption {
   OptionValue value;
 };
 
-/// All options, in the order of the table.
+/// All options, in the order of the files. Their values read back the same.
 std::vector<NamedOption> listOptions(const EventFusionOptions& options);
+/// Sets an option from the text of a file. Paths are relative to `folder`.
+/// @return false if there is no such option.
+/// @throws std::invalid_argument saying what is expected: "must be a number, or auto".
+bool setOption(EventFusionOptions& options, std::string_view section, std::string_view key,
+               std::string_view text, const std::filesystem::path& folder);
 /// Whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 

@@ -41,18 +41,6 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   return mapper;
 }
 
-void LiveOptions::validate() const {
-  requireOption(max_event_rate == 0 || (max_event_rate >= 1000 && max_event_rate <= 1e10),
-                "max_event_rate", max_event_rate, "0 (no limit), or 1000 to 1e10");
-  requireOption(max_queue_events >= 1000, "max_queue_events", max_queue_events, "1000 or above");
-  requireOption(max_queue_mb >= 1 && max_queue_mb <= 1e6, "max_queue_mb", max_queue_mb, "1 to 1e6");
-  requireOption(max_pose_wait_s > 0 && max_pose_wait_s <= 3600, "max_pose_wait_s", max_pose_wait_s,
-                "above 0, at most 3600");
-  requireOption(max_keyframes >= 1, "max_keyframes", max_keyframes, "1 or above");
-  requireOption(max_speed_m_s > 0, "max_speed_m_s", max_speed_m_s, "above 0");
-  requireOption(max_turn_deg_s > 0, "max_turn_deg_s", max_turn_deg_s, "above 0");
-}
-
 double LiveOptions::queueEvents() const {
   return std::min(static_cast<double>(max_queue_events), max_queue_mb * 1e6 / sizeof(Event));
 }

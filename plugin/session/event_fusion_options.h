@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
@@ -60,7 +61,20 @@ struct LiveOptions {
 
   /// The events that may wait, by both limits.
   double queueEvents() const;
-  void validate() const;
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    visit("enabled", self.enabled);
+    visit("max_event_rate", self.max_event_rate,
+          Allowed::from(1000, 1e10, "0 (no limit), or 1000 to 1e10").orZero());
+    visit("max_queue_events", self.max_queue_events, Allowed::atLeast(1000, "1000 or above"));
+    visit("max_queue_mb", self.max_queue_mb, Allowed::from(1, 1e6, "1 to 1e6"));
+    visit("max_pose_wait_s", self.max_pose_wait_s,
+          Allowed::above(0, 3600, "above 0, at most 3600"));
+    visit("max_keyframes", self.max_keyframes, Allowed::atLeast(1, "1 or above"));
+    visit("max_speed_m_s", self.max_speed_m_s, Allowed::above(0, "above 0"));
+    visit("max_turn_deg_s", self.max_turn_deg_s, Allowed::above(0, "above 0"));
+  }
+  void validate() const { requireFields(*this); }
 };
 
 /// Shortens a window that was chosen, and a stride that was chosen with it.

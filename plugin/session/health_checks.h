@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"
@@ -119,7 +120,7 @@ Warning noSceneWarning();
 
 /// Says in a sentence why a finished session made no keyframe: no events, no poses, poses and
 /// events that miss each other (by how much), noise alone, or too few of both for one window.
-std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
+OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
 
 /// Says what is wrong about the poses, and the option or file that would mend it.
 /// @param rig with which it was found.

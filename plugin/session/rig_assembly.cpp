@@ -23,6 +23,8 @@ bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
   return T_b_c.translation.norm() < kRounding && T_b_c.rotation.vec().norm() < kRounding;
 }
 
+OptionName timeOffsets() { return {"rig", "time_offsets_s", " (how many)"}; }
+
 void requireSame(const RigCamera& first, const EventPacket& packet) {
   if (isSame(first, packet.calibration)) return;
   throw std::invalid_argument(
@@ -92,13 +94,14 @@ void RigAssembly::applyOptions(EventPacket& packet) {
     recorded = given;
   }
   if (!isCalibrated(recorded.model)) {
-    throw std::invalid_argument(fmt::format(
-        "camera {} has no calibration: a map needs --calibration FILE ([rig] calibration)",
-        camera));
+    throw OptionHint(
+        fmt::format("camera {} has no calibration: a map needs --calibration FILE ([rig] "
+                    "calibration)",
+                    camera),
+        {{"rig", "calibration"}});
   }
   if (time_offsets_ns_.empty()) return;
-  requireOption(camera < time_offsets_ns_.size(), "[rig] time_offsets_s (how many)",
-                time_offsets_ns_.size(),
+  requireOption(camera < time_offsets_ns_.size(), timeOffsets(), time_offsets_ns_.size(),
                 fmt::format("one per camera, and there is camera {}", camera));
   recorded.time_offset_ns = time_offsets_ns_[camera];
 }
@@ -172,15 +175,14 @@ void RigAssembly::requireOptionsFit() const {
   const auto count = static_cast<std::size_t>(num_cameras_);
   const std::string expected = fmt::format("a camera of the recording: 0 to {}", num_cameras_ - 1);
   for (const int camera : selected_cameras_) {
-    requireOption(camera < num_cameras_, "[rig] cameras", camera, expected);
+    requireOption(camera < num_cameras_, OptionName("rig", "cameras"), camera, expected);
   }
   if (count == 0) return;
-  requireOption(reference_camera_ < num_cameras_, "[dsi] reference_camera", reference_camera_,
-                expected);
+  requireOption(reference_camera_ < num_cameras_, OptionName("dsi", "reference_camera"),
+                reference_camera_, expected);
   if (setup_.calibration) setup_.calibration->requireCameras(count);
-  requireOption(time_offsets_ns_.empty() || time_offsets_ns_.size() == count,
-                "[rig] time_offsets_s (how many)", time_offsets_ns_.size(),
-                fmt::format("one per camera of the recording: {}", count));
+  requireOption(time_offsets_ns_.empty() || time_offsets_ns_.size() == count, timeOffsets(),
+                time_offsets_ns_.size(), fmt::format("one per camera of the recording: {}", count));
 }
 
 std::map<int, std::uint64_t> RigAssembly::waitingEvents() const {

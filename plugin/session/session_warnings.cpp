@@ -29,20 +29,20 @@ std::string fullWindow(const KeyframePolicyOptions& options) {
   return duration + " s (window_s)";
 }
 
-std::string whyNoPoses(const SessionStatus& status) {
+OptionHint whyNoPoses(const SessionStatus& status) {
   std::string why = "the recording has no poses";
   if (status.other_poses.empty()) return why + ": a map needs --poses FILE";
   const char* before = " of the source that [rig] pose_source says, but of ";
   for (const auto& [source, count] : status.other_poses) {
     why += std::exchange(before, ", ") + asText(source);
   }
-  return why;
+  return {why, {{"rig", "pose_source"}}};
 }
 
 }  // namespace
 
-std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
-  if (!status.events) return "the recording has no events";
+OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
+  if (!status.events) return OptionHint("the recording has no events");
   if (!status.poses) return whyNoPoses(status);
   const std::int64_t start_ns = status.events->first_ns;
   const auto text = [&](const TimeSpan& span) {
@@ -56,7 +56,9 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
     return fmt::format("{}: they miss each other by {} s", spans,
                        formatSeconds(first_ns - last_ns));
   }
-  if (status.live && !status.live->too_large.empty()) return status.live->too_large;
+  if (status.live && !status.live->too_large.empty()) {
+    return {status.live->too_large, {{"keyframes", "window_s"}, {"live", "max_queue_events"}}};
+  }
   const EventCounts counts = status.counts.total();
   if (counts[EventFate::kFiltered] > 0 && counts[EventFate::kUsed] == 0 &&
       counts[EventFate::kFiltered] + counts[EventFate::kDropped] == counts.read) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "plugin/options/option_file.h"
+#include "plugin/options/option_keys.h"
 #include "test/paths.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"

@@ -8,6 +8,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/option_choice.h"
+#include "plugin/options/option_keys.h"
 #include "test/studies/frames/slider_keyframe.h"
 #include "test/studies/frames/slider_truth.h"
 #include "test/studies/methods/depth_curve.h"

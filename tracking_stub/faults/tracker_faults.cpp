@@ -5,8 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mapping/base/option.h"
-#include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
@@ -178,49 +176,22 @@ class Perturbation {
 
 }  // namespace
 
-void KeyframeNoiseOptions::validate() const {
-  requireOption(noise_m >= 0 && noise_m <= 1e3, "noise_m of keyframes", noise_m, "0 to 1e3");
-  requireOption(noise_rad >= 0 && noise_rad <= 3.2, "noise_rad of keyframes", noise_rad,
-                "0 to 3.2");
-  requireOption(!any() || length_ns.has_value(), "length_ns of keyframes", "nothing",
+void TrackerFaults::validate() const {
+  const auto& [noise_m, noise_rad, length_ns, start_ns] = perturbation.keyframe;
+  requireOption(!perturbation.keyframe.any() || length_ns, "length_ns of keyframes", "nothing",
                 "given where there is noise per keyframe");
+  // A short length may come from the stride of keyframes, not from `keyframe_s`.
   requireOption(!length_ns || (*length_ns >= 1'000'000 && *length_ns <= 1'000'000'000'000'000),
                 "length_ns of keyframes", length_ns.value_or(0), "1e6 to 1e15");
   requireOption(!start_ns || (*start_ns > -kEndOfTimeNs && *start_ns < kEndOfTimeNs),
                 "start_ns of keyframes", start_ns.value_or(0), "within 4.6e18 of 0");
-}
-
-void PoseDriftOptions::validate() const {
-  requireOption(fraction >= 0 && fraction <= 1, "fraction", fraction, "0 to 1");
-  requireOption(rad_per_m >= 0 && rad_per_m <= 10, "rad_per_m", rad_per_m, "0 to 10");
-}
-
-void PosePerturbationOptions::validate() const {
-  requireOption(noise_m >= 0 && noise_m <= 1e3, "noise_m", noise_m, "0 to 1e3");
-  requireOption(noise_rad >= 0 && noise_rad <= 3.2, "noise_rad", noise_rad, "0 to 3.2");
-  keyframe.validate();
-  drift.validate();
-  TrajectoryOptions{max_pose_gap_s}.validate();
+  requireFields(*this);
+  TrajectoryOptions{perturbation.max_pose_gap_s}.validate();
+  const std::int64_t tick_ns = perturbation.tick_ns;
   requireOption(tick_ns >= 1 && tick_ns < 1'000'000, "tick_ns", tick_ns, "1 to 999999");
-}
-
-void PoseDropoutOptions::validate() const {
-  requireOption(drop_probability >= 0 && drop_probability <= 1, "drop_probability",
-                drop_probability, "0 to 1");
-  requireOption(random_gaps_hz >= 0 && std::isfinite(random_gaps_hz), "random_gaps_hz",
-                random_gaps_hz, "0 or more");
-  requireOption(random_gap_s > 0 && random_gap_s <= 1e6, "random_gap_s", random_gap_s,
-                "above 0, at most 1e6");
-  for (const TimeGap& gap : gaps) {
+  for (const TimeGap& gap : dropouts.gaps) {
     requireOption(gap.begin_ns < gap.end_ns, "end of a gap", gap.end_ns, "after its begin");
   }
-}
-
-void TrackerFaults::validate() const {
-  perturbation.validate();
-  dropouts.validate();
-  requireOption(latency_ns >= 0 && latency_ns <= kMaxLatencyNs, "latency_ns", latency_ns,
-                "0 to 1e10");
 }
 
 std::vector<StampedPose> withFaults(const std::vector<StampedPose>& poses,

@@ -5,6 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/base/option.h"
+#include "mapping/geometry/rigid3.h"
+#include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 
 namespace efm {
@@ -15,15 +18,14 @@ namespace efm {
 /// not change. Where an interval begins, two interpolated poses are inserted: one a tick before the
 /// jump and one after it. So interpolation does not carry the jump into an interval.
 struct KeyframeNoiseOptions {
-  double noise_m = 0;    ///< Standard deviation on each axis, 0 to 1e3.
-  double noise_rad = 0;  ///< Standard deviation on each axis, 0 to 3.2.
-  /// Length of the intervals, 1e6 to 1e15. Required where there is noise.
+  double noise_m = 0;    ///< Standard deviation on each axis.
+  double noise_rad = 0;  ///< Standard deviation on each axis.
+  /// Length of the intervals. Required where there is noise.
   std::optional<std::int64_t> length_ns;
   /// Start of interval 0. Default: the time of the first pose.
   std::optional<std::int64_t> start_ns;
 
   bool any() const { return noise_m > 0 || noise_rad > 0; }
-  void validate() const;
 };
 
 /// Drift of odometry. The default is none.
@@ -31,11 +33,10 @@ struct KeyframeNoiseOptions {
 /// The heading rotates about one axis and the position moves in one direction, both in proportion
 /// to the path length so far. Axis and direction are random unit vectors in the world.
 struct PoseDriftOptions {
-  double fraction = 0;   ///< Of the path length: metres per metre, 0 to 1.
-  double rad_per_m = 0;  ///< Rotation of the heading, 0 to 10.
+  double fraction = 0;   ///< Of the path length: metres per metre.
+  double rad_per_m = 0;  ///< Rotation of the heading.
 
   bool any() const { return fraction > 0 || rad_per_m > 0; }
-  void validate() const;
 };
 
 /// Errors of a tracker's poses. The default is none.
@@ -45,8 +46,8 @@ struct PoseDriftOptions {
 /// noise of a position is in the world frame, that of a rotation about the rig's axes.
 struct PosePerturbationOptions {
   /// Independent noise of each pose: standard deviation on each axis.
-  double noise_m = 0;    ///< Of the position, 0 to 1e3.
-  double noise_rad = 0;  ///< Of the rotation, 0 to 3.2.
+  double noise_m = 0;    ///< Of the position.
+  double noise_rad = 0;  ///< Of the rotation.
   KeyframeNoiseOptions keyframe;
   PoseDriftOptions drift;
   /// Poses are not interpolated across longer gaps. See TrajectoryOptions.
@@ -55,7 +56,6 @@ struct PosePerturbationOptions {
   std::uint64_t seed = 0;
 
   bool any() const { return noise_m > 0 || noise_rad > 0 || keyframe.any() || drift.any(); }
-  void validate() const;
 };
 
 /// A time interval [begin, end).
@@ -66,25 +66,49 @@ struct TimeGap {
 
 /// Poses that a tracker loses. The default is none.
 struct PoseDropoutOptions {
-  double drop_probability = 0;  ///< Of each pose, 0 to 1.
+  double drop_probability = 0;  ///< Of each pose.
   std::vector<TimeGap> gaps;    ///< All poses in these are lost. In any order.
-  double random_gaps_hz = 0;    ///< Random gaps per second of tracking, 0 or more.
-  double random_gap_s = 0.5;    ///< Length of a random gap, above 0, at most 1e6.
+  double random_gaps_hz = 0;    ///< Random gaps per second of tracking.
+  double random_gap_s = 0.5;    ///< Length of a random gap.
   std::uint64_t seed = 0;
 
   bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
-  void validate() const;
 };
 
 /// All faults of a tracker. The default is none.
 struct TrackerFaults {
-  static constexpr std::int64_t kMaxLatencyNs = 10'000'000'000;
-
   PosePerturbationOptions perturbation;
   PoseDropoutOptions dropouts;
-  std::int64_t latency_ns = 0;  ///< Between a pose's stamp and its arrival, 0 to 1e10.
+  std::int64_t latency_ns = 0;  ///< Between a pose's stamp and its arrival.
 
   bool any() const { return perturbation.any() || dropouts.any() || latency_ns > 0; }
+  /// The keys and values of `--perturb`: metres, degrees and seconds. Not `gaps` and `tick_ns`.
+  template <typename Self, typename Visit>
+  static void fields(Self& self, Visit&& visit) {
+    const Allowed metres = Allowed::from(0, 1000, "a number, 0 to 1000 (metres)");
+    const Allowed degrees = Allowed::from(0, 180, "a number, 0 to 180 (degrees)");
+    const Allowed seconds = Allowed::from(0.001, 1e6, "a number, 0.001 to 1e6 (seconds)");
+    auto& poses = self.perturbation;
+    auto& keyframe = poses.keyframe;
+    visit("noise_m", poses.noise_m, metres);
+    visit("noise_deg", poses.noise_rad, degrees.in(kRadiansPerDegree));
+    visit("keyframe_noise_m", keyframe.noise_m, metres);
+    visit("keyframe_noise_deg", keyframe.noise_rad, degrees.in(kRadiansPerDegree));
+    visit("keyframe_s", keyframe.length_ns, seconds.in(kNanosecondsPerSecond));
+    visit("keyframe_start_s", keyframe.start_ns);
+    visit("drift", poses.drift.fraction,
+          Allowed::from(0, 1, "a number, 0 to 1 (metres per metre)"));
+    visit("drift_deg_per_m", poses.drift.rad_per_m,
+          Allowed::from(0, 500, "a number, 0 to 500 (degrees per metre)").in(kRadiansPerDegree));
+    visit("latency_s", self.latency_ns,
+          Allowed::from(0, 10, "a number, 0 to 10 (seconds)").in(kNanosecondsPerSecond));
+    visit("drop", self.dropouts.drop_probability,
+          Allowed::from(0, 1, "a number, 0 to 1 (the probability of each pose)"));
+    visit("gaps_hz", self.dropouts.random_gaps_hz,
+          Allowed::from(0, 1000, "a number, 0 to 1000 (gaps per second)"));
+    visit("gap_s", self.dropouts.random_gap_s, seconds);
+    visit("seed", poses.seed);  // of the dropouts, too
+  }
   void validate() const;
 };
 

@@ -10,6 +10,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/metrics/sample_statistics.h"
+#include "plugin/options/option_keys.h"
 #include "plugin/options/tracker_fault_keys.h"
 
 namespace efm {

@@ -12,7 +12,6 @@
 #include "mapping/events/event.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
 #include "test/mapping/keyframes/random_scene.h"
@@ -131,13 +130,6 @@ TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
   EXPECT_GT(found, 1000) << "both answers are there";
 }
 
-TEST(HotPixelOptions, HaveTheirLimits) {
-  using O = HotPixelOptions;
-  test::expectLimits<O>({{"hot_pixel_ratio", &O::ratio, {2, 1000}, {1.9, 1001, NAN}},
-                         {"hot_pixel_period_s", &O::period_s, {0.001, 100}, {0, 0.00099, 101, NAN}},
-                         {"hot_pixel_min_events", &O::min_events, {2, 30'000}, {1, 30'001}}});
-}
-
 using test::LongRecording;
 using test::Played;
 
@@ -182,13 +174,6 @@ TEST(EventFilter, AnEventOfAHotPixelSupportsNoOther) {
   EXPECT_FALSE(filter.keeps({1040 * kMs, 7, 7, true}));
   EXPECT_FALSE(filter.keeps({1041 * kMs, 8, 7, true})) << "(7, 7) is hot since 1007 ms";
   EXPECT_TRUE(filter.keeps({1042 * kMs, 9, 7, true}));
-}
-
-TEST(EventFilter, OptionsHaveTheirLimits) {
-  using O = EventFilterOptions;
-  const std::vector<double> wrong_s = {-1, 0.9e-9, 10.5, NAN};
-  test::expectLimits<O>(
-      {{"background_activity_s", &O::background_activity_s, {0, 1e-9, 10}, wrong_s}});
 }
 
 TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {

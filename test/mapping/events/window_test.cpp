@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "mapping/events/window.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::window_test {
@@ -156,11 +155,6 @@ TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
   for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
 }
 
-TEST(Subintervals, OptionsHaveTheirLimits) {
-  using O = SubintervalOptions;
-  test::expectLimits<O>({{"subintervals", &O::count, {1, 1000}, {0, 1001}}});
-}
-
 constexpr Window kWindow{0, 1200, 600};  // every number of sub-intervals below divides it
 
 /// How a window is divided.
@@ -249,7 +243,6 @@ TEST(SplitFusionOptions, AreTwoSlicesOfTwoPolaritiesAndNoneIsOneGroup) {
   using O = SplitFusionOptions;
   EXPECT_EQ(O().polarities() * 10 + O().time_slices, 22);
   EXPECT_EQ(O::none().polarities() * 10 + O::none().time_slices, 11);
-  test::expectLimits<O>({{"time_slices", &O::time_slices, {1, 1000}, {-1, 0, 1001}}});
 }
 
 }  // namespace

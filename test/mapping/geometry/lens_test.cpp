@@ -14,7 +14,7 @@
 #include "mapping/geometry/lens.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
-#include "test/mapping/base/refused_option.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm::lens_test {
 namespace {
@@ -82,15 +82,30 @@ TEST(Camera, EveryFieldHasItsLimits) {
   using M = CameraModel;
   const std::vector<double> not_above_0 = {0, -1, NAN, INFINITY};
   const std::vector<double> not_finite = {NAN, INFINITY, -INFINITY};
-  const auto last = [](M& model, double value) { model.coefficients[3] = value; };
-  test::expectLimits<M>({{"width", &M::width, {1, 65'535}, {0, 65'536}},
-                         {"height", &M::height, {1, 65'535}, {0, 65'536}},
-                         {"fx", &M::fx, {1e-9}, not_above_0},
-                         {"fy", &M::fy, {1e-9}, not_above_0},
-                         {"cx", &M::cx, {-5, 0}, not_finite},
-                         {"cy", &M::cy, {-5, 0}, not_finite},
-                         {"distortion coefficient", last, {-5}, not_finite}},
-                        davis346(DistortionModel::kRadtan, {0, 0, 0, 0}));
+  const struct {
+    std::string key;
+    std::function<void(M&, double)> set;
+    std::vector<double> allowed;
+    std::vector<double> rejected;
+  } cases[] = {
+      {"width", [](M& m, double v) { m.width = int(v); }, {1, 65'535}, {0, 65'536}},
+      {"height", [](M& m, double v) { m.height = int(v); }, {1, 65'535}, {0, 65'536}},
+      {"fx", [](M& m, double v) { m.fx = v; }, {1e-9}, not_above_0},
+      {"fy", [](M& m, double v) { m.fy = v; }, {1e-9}, not_above_0},
+      {"cx", [](M& m, double v) { m.cx = v; }, {-5, 0}, not_finite},
+      {"cy", [](M& m, double v) { m.cy = v; }, {-5, 0}, not_finite},
+      {"distortion coefficient", [](M& m, double v) { m.coefficients[3] = v; }, {-5}, not_finite}};
+  for (const auto& c : cases) {
+    M model = davis346(DistortionModel::kRadtan, {0, 0, 0, 0});
+    for (const double value : c.allowed) {
+      c.set(model, value);
+      EXPECT_NO_THROW(model.validate()) << c.key << " = " << value;
+    }
+    for (const double value : c.rejected) {
+      c.set(model, value);
+      EXPECT_THAT(messageOf([&] { model.validate(); }), testing::StartsWith(c.key + " = "));
+    }
+  }
 }
 
 TEST(Camera, AWrongCountOfCoefficientsSaysWhatIsExpected) {

@@ -9,7 +9,7 @@
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "test/mapping/base/refused_option.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm::reference_view_test {
 namespace {
@@ -56,13 +56,14 @@ TEST(DepthPlanes, StepsAreDistancesOfPlanesInInverseDepth) {
   EXPECT_EQ(one.inverseDepthStepAt(0), 0);
 }
 
-TEST(DepthPlanes, OptionsHaveTheirLimits) {
-  using O = DepthPlanesOptions;
-  test::expectLimits<O>({{"min_depth_m", &O::min_depth_m, {0.001, 4.999}, {0, -1, 0.000999, NAN}},
-                         {"max_depth_m", &O::max_depth_m, {0.501, 1e6}, {0.5, 0.001, 0, 1'000'001}},
-                         {"max_depth_m", &O::max_depth_m, {}, {INFINITY, NAN}},
-                         {"num_planes", &O::num_planes, {1, 100'000}, {0, 100'001}}});
-  EXPECT_THROW(DepthPlanes({2, 1, 10, PlaneSpacing::kInverse}), std::invalid_argument);
+TEST(DepthPlanes, LimitsAreInTheirOrderAndInTheRangeOfCameras) {
+  const auto error = [](double min_depth_m, double max_depth_m) {
+    return messageOf([&] { DepthPlanes({min_depth_m, max_depth_m, 10, PlaneSpacing::kInverse}); });
+  };
+  EXPECT_EQ(error(0.001, 1e6), "no error");
+  EXPECT_EQ(error(0.5, 0.5), "max_depth_m = 0.5: must be finite and above min_depth_m");
+  EXPECT_EQ(error(0.000999, 5), "min_depth_m = 0.000999: must be at least 0.001");
+  EXPECT_EQ(error(0.5, 1'000'001), "max_depth_m = 1000001: must be at most 1000000");
 }
 
 /// Pixels that are not squares, a principal point that is not in the middle.
@@ -128,20 +129,16 @@ TEST(ReferenceView, TheFieldOfViewIsTheAngleBetweenTheRaysOfLeftAndRightEdge) {
 }
 
 TEST(ReferenceView, OptionsHaveTheirLimits) {
-  using O = ReferenceViewOptions;
-  const auto offset = [](int axis) {
-    return [axis](O& options, double value) { options.offset_m[axis] = value; };
-  };
-  test::expectLimits<O>({{"fov_deg", &O::fov_deg, {1e-6, 179.9}, {0, -1, 180, NAN}},
-                         {"width", &O::width, {1, 65'535}, {0, 65'536}},
-                         {"height", &O::height, {1, 65'535}, {0, 65'536}},
-                         {"rv_offset_m", offset(0), {-1}, {NAN, INFINITY}},
-                         {"rv_offset_m", offset(1), {-1}, {NAN, INFINITY}},
-                         {"rv_offset_m", offset(2), {-1}, {NAN, INFINITY}}});
+  for (const int axis : {0, 1, 2}) {
+    ReferenceViewOptions options;
+    options.offset_m[axis] = NAN;
+    EXPECT_EQ(messageOf([&] { options.validate(); }), "rv_offset_m = nan: must be finite");
+  }
   // At most 2^26 pixels, also where one side follows from the other.
-  test::expectLimits<O>({{"width", &O::width, {8192}, {8193}}}, sized(1, 8192));
+  EXPECT_NO_THROW(sized(8192, 8192).validate());
+  EXPECT_THROW(sized(8193, 8192).validate(), OptionError);
   EXPECT_NO_THROW(makeReferenceView(kModel, sized(10'032, {})));
-  EXPECT_THROW(makeReferenceView(kModel, sized(10'033, {})), std::invalid_argument);
+  EXPECT_THROW(makeReferenceView(kModel, sized(10'033, {})), OptionError);
 }
 
 TEST(Timestamp, DecimalTextIsReadToTheNanosecond) {

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm::fusion_mapper_test {
 namespace {
@@ -177,30 +177,15 @@ TEST(FusionMapper, AGapOfYearsCostsNoTime) {
 }
 
 TEST(FusionMapper, InvalidOptionsAreNamed) {
-  using O = FusionMapperOptions;
-  const auto cameras = [](O& o, double last) { o.cameras = {1, 0, static_cast<int>(last)}; };
-  // One of each part; their own tests have all.
-  test::expectLimits<O>(
-      {{"max_pose_gap_s", [](O& o, double v) { o.trajectory.max_pose_gap_s = v; }, {}, {0}},
-       {"window_s", [](O& o, double v) { o.policy.window_s = v; }, {}, {0}},
-       {"num_planes", [](O& o, double v) { o.keyframe.planes.num_planes = int(v); }, {}, {0}},
-       {"reference_camera",
-        [](O& o, double v) { o.keyframe.reference_camera = int(v); },
-        {0},
-        {-1}},
-       {"fov_deg", [](O& o, double v) { o.keyframe.view.fov_deg = v; }, {}, {0}},
-       {"subintervals", [](O& o, double v) { o.keyframe.subintervals.count = int(v); }, {}, {0}},
-       {"time_slices", [](O& o, double v) { o.keyframe.split.time_slices = int(v); }, {}, {0}},
-       {"packet_error_px",
-        [](O& o, double v) { o.keyframe.packets.packet_error_px = v; },
-        {},
-        {-1}},
-       {"threads", [](O& o, double v) { o.keyframe.sweep.threads = int(v); }, {}, {0}},
-       {"threshold_c", [](O& o, double v) { o.keyframe.extraction.threshold_c = v; }, {}, {300}},
-       {"min_gain", [](O& o, double v) { o.keyframe.motion.min_gain = v; }, {}, {2}},
-       {"hot_pixel_ratio", [](O& o, double v) { o.filter.hot_pixel.ratio = v; }, {}, {0}},
-       {"cameras", cameras, {2}, {-1, 0, 1}}});
-  O wrong = period();
+  FusionMapperOptions wrong = period();
+  for (const int last : {-1, 0, 1, 2}) {
+    wrong.cameras = {1, 0, last};
+    EXPECT_EQ(messageOf([&] { FusionMapper{wrong}; }).find("cameras = ") == 0, last != 2) << last;
+  }
+  wrong.cameras = {};
+  wrong.keyframe.reference_camera = -1;
+  EXPECT_EQ(messageOf([&] { FusionMapper{wrong}; }), "reference_camera = -1: must be 0 or above");
+  wrong = period();
   for (const std::int64_t t1_ns : {10, 20}) {
     wrong.limits = {20, t1_ns};
     EXPECT_THAT([&] { wrong.validate(); },

@@ -9,7 +9,6 @@
 #include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/motion/motion_correction.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/motion/moving_edges.h"
@@ -243,16 +242,6 @@ TEST(MotionCorrection, WithoutEventsThatMeetTheCorrectionIsThatOfTheInput) {
     EXPECT_LT((found.linear_m_s - search.current.linear_m_s).norm(), 1e-12);
     EXPECT_LT((found.angular_rad_s - search.current.angular_rad_s).norm(), 1e-12);
   }
-}
-
-TEST(MotionCorrection, OptionsHaveTheirLimits) {
-  using O = MotionCorrectionOptions;
-  test::expectLimits<O>(
-      {{"motion_sigma_m_s", &O::motion_sigma_m_s, {1e-9, 10}, {0, -1, 10.1, NAN}},
-       {"motion_sigma_deg_s", &O::motion_sigma_deg_s, {1e-9, 1000}, {0, -1, 1001, NAN}},
-       {"motion_rounds", &O::motion_rounds, {1, 10}, {0, 11}},
-       {"max_events", &O::max_events, {100, 10'000'000}, {99, 10'000'001}},
-       {"min_gain", &O::min_gain, {0, 1}, {-0.1, 1.1, NAN}}});
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "mapping/rays/rays.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
 
 namespace efm {
@@ -330,11 +329,6 @@ TEST(PosePackets, EventsWithoutAPoseAreCountedAndLeftOutThoseAtALonePoseAreNot) 
   EXPECT_EQ(posed, expected);
   EXPECT_EQ(packets.without_pose, recording.events.size() - expected);
   EXPECT_GT(packets.without_pose, recording.events.size() / 3);
-}
-
-TEST(PosePackets, OptionsHaveTheirLimits) {
-  using O = PosePacketsOptions;
-  test::expectLimits<O>({{"packet_error_px", &O::packet_error_px, {0, 10}, {-0.1, 10.1, NAN}}});
 }
 
 }  // namespace

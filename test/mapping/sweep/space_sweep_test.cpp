@@ -10,7 +10,6 @@
 
 #include "mapping/events/window.h"
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
@@ -240,7 +239,6 @@ TEST(SpaceSweep, ACamerasPeaksAreThoseOfItsOwnSweep) {
 
 TEST(SpaceSweep, OptionsHaveTheirLimits) {
   using O = SpaceSweepOptions;
-  test::expectLimits<O>({{"threads", &O::threads, {1, 1024}, {0, 1025}}});
   EXPECT_THROW(sweepSpace({{RayBundle()}}, DsiGrid(), {{}, 0, {}}), std::invalid_argument);
   const tbb::global_control two_cores(tbb::global_control::max_allowed_parallelism, 2);
   EXPECT_EQ(O().threadsOrCores(), 2);

@@ -12,7 +12,6 @@
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/map_point.h"
 #include "maps/cloud/visibility_grid.h"
-#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -154,12 +153,6 @@ TEST(RemoveOutliers, PointsThatAreNotFiniteAreRefused) {
   EXPECT_THAT(numbers(removeOutliers(onALine({0, 0, 9.9e17}), {1, 1})), ElementsAre(1, 2));
 }
 
-TEST(OutlierRemovalOptions, ValuesOutOfRangeAreRefusedByName) {
-  using Options = OutlierRemovalOptions;
-  test::expectRange(&Options::outlier_radius_m, 1e-6, 1e6, "outlier_radius_m");
-  test::expectRange(&Options::outlier_min_neighbors, 1, 10000, "outlier_min_neighbors");
-}
-
 ConsistencyOptions options() {
   ConsistencyOptions options;
   options.consistency_tolerance = 0.05;
@@ -248,15 +241,6 @@ RC_GTEST_PROP(VisibilityGrid, DecidesLikeBruteForce, ()) {
     if (grid.verdictOn(T_world_ref * asked) != expected) ++differing;
   }
   RC_ASSERT(differing <= 1);  // rounding may move a point over a cell's border
-}
-
-TEST(ConsistencyOptions, ValuesOutOfRangeAreRefusedByName) {
-  using Options = ConsistencyOptions;
-  test::expectRange(&Options::consistency_tolerance, 0.001, 1, "consistency_tolerance");
-  test::expectRange(&Options::consistency_cell_deg, 0.01, 10, "consistency_cell_deg");
-  test::expectRange(&Options::max_contradictions, 0, 16, "max_contradictions");
-  EXPECT_THAT(messageOf([] { consistencyFromName("some"); }),
-              testing::HasSubstr("none, support, visibility"));
 }
 
 }  // namespace

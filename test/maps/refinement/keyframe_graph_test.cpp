@@ -11,7 +11,6 @@
 #include "maps/refinement/keyframe_graph.h"
 #include "maps/refinement/tracker_model.h"
 #include "random_poses.h"
-#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -159,14 +158,6 @@ TEST(EstimateTrackerErrors, StaysFiniteWhateverTheSamplesAre) {
       EXPECT_LT(error, 1) << strange;
     }
   }
-}
-
-TEST(TrackerErrors, ValuesOutOfRangeAreRefusedByName) {
-  constexpr double kMaxRad = 1000 * kRadiansPerDegree;
-  test::expectRange(&TrackerErrors::noise_m, 0, 1000, "tracker_noise_m");
-  test::expectRange(&TrackerErrors::noise_rad, 0, kMaxRad, "tracker_noise_deg");
-  test::expectRange(&TrackerErrors::drift_m, 0, 1000, "tracker_drift");
-  test::expectRange(&TrackerErrors::drift_rad, 0, kMaxRad, "tracker_drift_deg_per_m");
 }
 
 }  // namespace

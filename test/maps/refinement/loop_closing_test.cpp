@@ -8,7 +8,6 @@
 
 #include "edges.h"
 #include "random_poses.h"
-#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -145,16 +144,6 @@ TEST(VerifyLoop, OptionsLimitTheSigmasAndTheInliers) {
   strict = {};
   strict.loop_min_inliers = 1;
   EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}).factor);
-}
-
-TEST(LoopOptions, ValuesOutOfRangeAreRefusedByName) {
-  const double infinity = std::numeric_limits<double>::infinity();
-  test::expectRange(&LoopOptions::loop_min_overlap, test::kAboveZero, 1, "loop_min_overlap");
-  test::expectRange(&LoopOptions::loop_min_inliers, 0, 1, "loop_min_inliers");
-  test::expectRange(&LoopOptions::loop_max_sigma_m, test::kAboveZero, infinity, "loop_max_sigma_m");
-  test::expectRange(&LoopOptions::loop_max_sigma_rad, test::kAboveZero, infinity,
-                    "loop_max_sigma_deg");
-  test::expectRange(&LoopOptions::loop_checks, 0, 100, "loop_checks");
 }
 
 TEST(VerifyLoop, StripesDoNotConfirmAPositionAlongThem) {

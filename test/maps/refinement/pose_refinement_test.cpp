@@ -8,7 +8,6 @@
 
 #include "maps/refinement/pose_refinement.h"
 #include "random_poses.h"
-#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -412,13 +411,6 @@ TEST(PoseCovariance, IsNothingWhereFactorsLeaveThePoseOpen) {
   EXPECT_FALSE(poseCovariance(PoseGraphOptions(), pair, 1)) << "one direction is open";
   graph.factors[1].sqrt_information(2, 2) = kNan;
   EXPECT_FALSE(poseCovariance(PoseGraphOptions(), graph, 1)) << "not finite";
-}
-
-TEST(AlignmentOptions, ValuesOutOfRangeAreRefusedByName) {
-  test::expectRange(&AlignmentOptions::robust_sigmas, test::kAboveZero, 1e3, "robust_sigmas");
-  test::expectRange(&AlignmentOptions::max_iterations, 1, 1000, "max_iterations");
-  test::expectRange(&PoseGraphOptions::robust_sigmas, test::kAboveZero, 1e3, "robust_sigmas");
-  test::expectRange(&PoseGraphOptions::max_iterations, 1, 1000, "max_iterations");
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "plugin/mrpt/host_options.h"
+#include "plugin/options/option_keys.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -10,7 +10,6 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "plugin/session/first_look.h"
-#include "test/mapping/base/refused_option.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -409,17 +408,6 @@ TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
       expectSameMap(session, expected);
     }
   }
-}
-
-TEST(LiveOptions, HaveLimits) {
-  using O = LiveOptions;
-  test::expectLimits<O>({{"max_event_rate", &O::max_event_rate, {0, 1000, 1e10}, {999, -1, 1.1e10}},
-                         {"max_queue_events", &O::max_queue_events, {1000}, {999}},
-                         {"max_queue_mb", &O::max_queue_mb, {1, 1e6}, {0.9, 1'000'001}},
-                         {"max_pose_wait_s", &O::max_pose_wait_s, {0.1, 3600}, {0, 3601}},
-                         {"max_keyframes", &O::max_keyframes, {1}, {0}},
-                         {"max_speed_m_s", &O::max_speed_m_s, {0.1}, {0}},
-                         {"max_turn_deg_s", &O::max_turn_deg_s, {0.1}, {0}}});
 }
 
 // --- The options' calibration ------------------------------------------------------------------

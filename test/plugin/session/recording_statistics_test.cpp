@@ -149,7 +149,7 @@ std::string why(const std::function<void(SessionStatus&, FusionMapperOptions&)>&
   FusionMapperOptions options;
   options.policy.window_s = 1;
   change(status, options);
-  return whyNoKeyframe(status, options);
+  return whyNoKeyframe(status, options).what();
 }
 
 TEST(WhyNoKeyframe, SaysWhatIsMissing) {

@@ -83,7 +83,7 @@ TEST(TrackerFaults, ThatMoveNoPoseTakePosesInAnyOrder) {
   TrackerFaults faults;
   EXPECT_FALSE(faults.any());
   EXPECT_TRUE(areSame(withFaults(poses, faults), poses));
-  faults.latency_ns = TrackerFaults::kMaxLatencyNs;
+  faults.latency_ns = 10'000'000'000;
   EXPECT_TRUE(faults.any());
   EXPECT_TRUE(areSame(withFaults(poses, faults), poses));
   EXPECT_THAT([&] { withFaults(poses, keyframeNoise(0.01, 0)); },
@@ -321,27 +321,16 @@ TEST(TrackerFaults, LosePosesBeforeTheyMoveThem) {
 TEST(TrackerFaults, OutOfRangeAreRefused) {
 #define WRONG(field, value) [](TrackerFaults& faults) { faults.field = value; }
   const std::pair<void (*)(TrackerFaults&), const char*> rows[] = {
-      {WRONG(perturbation.noise_m, -1), "noise_m = -1: must be 0 to 1e3"},
-      {WRONG(perturbation.noise_rad, NAN), "noise_rad = nan: must be 0 to 3.2"},
-      {WRONG(perturbation.keyframe.noise_m, 1001), "noise_m of keyframes = 1001: must be 0 to 1e3"},
-      {WRONG(perturbation.keyframe.noise_rad, 4), "noise_rad of keyframes = 4: must be 0 to 3.2"},
       {WRONG(perturbation.keyframe.noise_m, 1),
        "length_ns of keyframes = nothing: must be given where there is noise per keyframe"},
       {WRONG(perturbation.keyframe.length_ns, 9),
        "length_ns of keyframes = 9: must be 1e6 to 1e15"},
       {WRONG(perturbation.keyframe.start_ns, kEndOfTimeNs),
        "start_ns of keyframes = 4611686018427387903: must be within 4.6e18 of 0"},
-      {WRONG(perturbation.drift.fraction, 1.5), "fraction = 1.5: must be 0 to 1"},
-      {WRONG(perturbation.drift.rad_per_m, 11), "rad_per_m = 11: must be 0 to 10"},
       {WRONG(perturbation.max_pose_gap_s, 0),
        "max_pose_gap_s = 0: must be above 0 and at most 1e6"},
       {WRONG(perturbation.tick_ns, 0), "tick_ns = 0: must be 1 to 999999"},
-      {WRONG(dropouts.drop_probability, 1.1), "drop_probability = 1.1: must be 0 to 1"},
-      {WRONG(dropouts.random_gaps_hz, -1), "random_gaps_hz = -1: must be 0 or more"},
-      {WRONG(dropouts.random_gap_s, 0), "random_gap_s = 0: must be above 0, at most 1e6"},
-      {WRONG(dropouts.gaps, {TimeGap()}), "end of a gap = 0: must be after its begin"},
-      {WRONG(latency_ns, -1), "latency_ns = -1: must be 0 to 1e10"},
-      {WRONG(latency_ns, 10'000'000'001), "latency_ns = 10000000001: must be 0 to 1e10"}};
+      {WRONG(dropouts.gaps, {TimeGap()}), "end of a gap = 0: must be after its begin"}};
 #undef WRONG
   for (const auto& [set, message] : rows) {
     TrackerFaults faults;

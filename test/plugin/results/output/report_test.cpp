@@ -6,6 +6,7 @@
 #include <functional>
 #include <tuple>
 
+#include "plugin/options/option_keys.h"
 #include "plugin/results/output/report.h"
 
 namespace efm {
