@@ -9,6 +9,8 @@
 #include <memory>
 #include <random>
 
+#include "mapping/kernels/tile_scatter.h"
+
 namespace efm::kernels {
 namespace {
 
@@ -68,8 +70,8 @@ using Cells = std::vector<CellTotal>;
 /// The functions of one kernel for a tile, against plain code.
 class TileTest {
  public:
-  TileTest(const TestedFunctions& functions, std::uint32_t seed)
-      : scatter_(functions.tile), resolve_(functions.resolve), random_(seed) {}
+  TileTest(VotingKernel kernel, std::uint32_t seed)
+      : scatter_(tileFunctions(kernel)), resolve_(resolveFunctions(kernel)), random_(seed) {}
 
   std::vector<std::string> run() {
     gather();
@@ -292,8 +294,7 @@ class TileTest {
 };
 
 /// Peaks of some planes with many equal values.
-std::vector<float> peaksOf(const TestedFunctions& functions, std::uint32_t seed,
-                           std::size_t pixels) {
+std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t pixels) {
   RandomNumbers random(seed);
   std::vector<float> best(pixels, -1.0F);
   std::vector<std::int32_t> plane(pixels, -2);
@@ -303,8 +304,9 @@ std::vector<float> peaksOf(const TestedFunctions& functions, std::uint32_t seed,
   std::vector<float> values(pixels);
   for (std::int32_t p = 0; p < 12; ++p) {
     for (float& value : values) value = random(0, 2, 4);
-    functions.peaks.add({best.data(), plane.data(), before.data(), after.data(), previous.data()},
-                        p, values.data(), pixels);
+    peakFunctions(kernel).add(
+        {best.data(), plane.data(), before.data(), after.data(), previous.data()}, p, values.data(),
+        pixels);
   }
   std::vector<float> all = best;
   all.insert(all.end(), plane.begin(), plane.end());
@@ -314,7 +316,7 @@ std::vector<float> peaksOf(const TestedFunctions& functions, std::uint32_t seed,
 }
 
 /// Sums of columns and ranks of positions; arrays with padding.
-std::vector<float> sumsOf(const TestedFunctions& functions, std::uint32_t seed, std::size_t n) {
+std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n) {
   RandomNumbers random(seed);
   std::vector<std::uint8_t> column(n + kColumnPadding);
   std::vector<float> positions(n + kRankPadding);
@@ -326,8 +328,8 @@ std::vector<float> sumsOf(const TestedFunctions& functions, std::uint32_t seed, 
   }
   std::vector<float> sum(n + kColumnPadding, 0.1F);
   std::vector<float> below(n + kRankPadding, 0.0F);
-  functions.columns.add(sum.data(), column.data(), n, 0.3F);
-  functions.ranks.add(below.data(), positions.data(), weights.data(), n);
+  columnFunctions(kernel).add(sum.data(), column.data(), n, 0.3F);
+  rankFunctions(kernel).add(below.data(), positions.data(), weights.data(), n);
   sum.resize(n);
   sum.insert(sum.end(), below.begin(), below.begin() + static_cast<std::ptrdiff_t>(n));
   return sum;
@@ -335,22 +337,13 @@ std::vector<float> sumsOf(const TestedFunctions& functions, std::uint32_t seed, 
 
 }  // namespace
 
-TestedFunctions TestedFunctions::of(VotingKernel kernel) {
-  TestedFunctions functions{
-      {}, {}, peakFunctions(kernel), columnFunctions(kernel), rankFunctions(kernel)};
-  if (kernel == VotingKernel::kPlain) return functions;
-  functions.tile = tileFunctions(kernel);
-  functions.resolve = resolveFunctions(kernel);
-  return functions;
-}
-
-std::vector<std::string> selfTest(const TestedFunctions& functions, std::uint32_t seed) {
+std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed) {
   std::vector<std::string> failures;
-  if (functions.tile.vote) failures = TileTest(functions, seed).run();
-  const TestedFunctions plain = TestedFunctions::of(VotingKernel::kPlain);
+  if (kernel != VotingKernel::kPlain)
+    failures = TileTest(kernel, seed).run();  // plain has no tiles
   const auto differs = [&](const auto& results_of) {
     for (const std::size_t n : {1U, 15U, 16U, 101U}) {
-      if (results_of(functions, seed, n) != results_of(plain, seed, n)) return true;
+      if (results_of(kernel, seed, n) != results_of(VotingKernel::kPlain, seed, n)) return true;
     }
     return false;
   };

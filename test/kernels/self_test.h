@@ -6,24 +6,13 @@
 #include <vector>
 
 #include "mapping/kernels/kernels.h"
-#include "mapping/kernels/tile_scatter.h"
 
 namespace efm::kernels {
 
-/// What a self-test calls.
-struct TestedFunctions {
-  TileFunctions tile;  ///< Null, with `resolve`, for the plain kernel, which has no tiles.
-  ResolveFunctions resolve;
-  PeakFunctions peaks;
-  ColumnFunctions columns;
-  RankFunctions ranks;
-
-  /// @param kernel one of `availableKernels`.
-  static TestedFunctions of(VotingKernel kernel);
-};
-
-/// Compares functions with plain code, on a small random input. Takes some milliseconds.
-/// @return what differs, one line each; empty where nothing does.
-std::vector<std::string> selfTest(const TestedFunctions& functions, std::uint32_t seed = 1);
+/// Compares the functions of a kernel with plain code, on a small random input. Takes some
+/// milliseconds.
+/// @param kernel one of `availableKernels`.
+/// @return what differs, one line each; empty if nothing does.
+std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed);
 
 }  // namespace efm::kernels

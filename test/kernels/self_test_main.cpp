@@ -28,10 +28,9 @@ int main(int argc, char** argv) {
     std::puts("not available: the kernel that the argument names");
     return 1;
   }
-  using efm::kernels::TestedFunctions;
   bool passed = true;
   for (std::uint32_t seed = 1; seed <= kRuns; ++seed) {
-    for (const std::string& failure : selfTest(TestedFunctions::of(kernel), seed)) {
+    for (const std::string& failure : efm::kernels::selfTest(kernel, seed)) {
       std::printf("%s, input %u: %s differ\n", *name, seed, failure.c_str());
       passed = false;
     }

@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/kernels/kernels.h"
+#include "test/kernels/self_test.h"
 
 namespace efm::kernels {
 namespace {
+
+TEST(SelfTest, EveryKernelOfThisProcessorPasses) {
+  for (const VotingKernel kernel : availableKernels()) {
+    for (const std::uint32_t seed : {1U, 2U, 3U}) {
+      EXPECT_THAT(selfTest(kernel, seed), ::testing::IsEmpty()) << nameOf(kernel) << ", " << seed;
+    }
+  }
+}
 
 struct Votes {
   std::vector<float> plane;
@@ -22,14 +29,6 @@ Votes voteAt(float x, float y) {
   Votes result{std::vector<float>(12, 0.0F), 0};
   result.cast = voteBilinear({&x, &y}, {0, 1, 1, 0, 0}, {result.plane.data(), 4, 3});
   return result;
-}
-
-TEST(VotePlain, AVoteIsSharedBilinearlyAmongFourPixels) {
-  const Votes votes = voteAt(1.25F, 0.5F);
-  EXPECT_EQ(votes.cast, 1U);
-  EXPECT_THAT(votes.plane, ::testing::ElementsAre(0, 0.375F, 0.125F, 0,  //
-                                                  0, 0.375F, 0.125F, 0,  //
-                                                  0, 0, 0, 0));
 }
 
 TEST(VotePlain, AVoteIsCastOnlyWhereAllFourPixelsAreInside) {
@@ -53,15 +52,6 @@ TEST(VotePlain, AVoteIsCastOnlyWhereAllFourPixelsAreInside) {
   }
 }
 
-TEST(VotePlain, TheTransferScalesThenShiftsTheRaysOfItsRangeAlone) {
-  const std::vector<float> x = {9, 1, 2, 9};
-  const std::vector<float> y = {9, 1, 1, 9};
-  std::vector<float> plane(12, 0.0F);
-  EXPECT_EQ(voteBilinear({x.data(), y.data()}, {1, 3, 0.5F, 0.5F, 0.5F}, {plane.data(), 4, 3}), 2U);
-  EXPECT_EQ(plane[1 * 4 + 1], 1.5F);  // (1, 1) and half of (1.5, 1)
-  EXPECT_EQ(plane[1 * 4 + 2], 0.5F);
-}
-
 constexpr float kUntouched = -7;
 
 struct Rule {
@@ -78,20 +68,6 @@ constexpr Rule kRules[] = {
     {"rms", &FusionFunctions::rms},
     {"max", &FusionFunctions::max},
 };
-
-/// From 10^min to 10^max, some zero and some subnormal.
-std::vector<float> randomValues(std::mt19937& random, std::size_t n, double min, double max) {
-  std::uniform_real_distribution<double> exponent(min, max);
-  std::vector<float> values(n);
-  for (float& value : values) {
-    const auto kind = random() % 8;
-    value = kind == 0 ? 0.0F
-            : kind == 1
-                ? std::numeric_limits<float>::denorm_min() * static_cast<float>(random() % 9)
-                : static_cast<float>(std::pow(10.0, exponent(random)));
-  }
-  return values;
-}
 
 std::vector<float> pairOf(const Rule& rule, std::vector<float> a, const std::vector<float>& b) {
   (*rule).pair(a.data(), b.data(), a.size());
@@ -116,22 +92,6 @@ TEST(FusionKernel, TouchesNoVoxelsButItsOwn) {
       (*rule).fold(values.data(), ones.data(), n);
       (*rule).finish(values.data(), 3, n);
       ASSERT_EQ(values.back(), kUntouched) << rule.name << ", " << n;
-    }
-  }
-}
-
-TEST(FusionKernel, TheMeanOfTwoIsThatOfTheirSum) {
-  std::mt19937 random(3);
-  const std::vector<float> a = randomValues(random, 1000, -6, 6);
-  const std::vector<float> b = randomValues(random, 1000, -6, 6);
-  for (const Rule& rule : kRules) {
-    const std::vector<float> pair = pairOf(rule, a, b);
-    const std::vector<float> mean = meanOf(rule, a, b);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      // A subnormal has no reciprocal. A logarithm is up to 90, which its exponential multiplies
-      // the rounding by.
-      ASSERT_NEAR(pair[i], mean[i], 2e-5 * mean[i] + 1e-37)
-          << rule.name << " of " << a[i] << " and " << b[i];
     }
   }
 }
