@@ -15,18 +15,14 @@ std::size_t index(const Dsi& dsi, int plane, int x, int y) {
          static_cast<std::size_t>(x);
 }
 
-enum class Fate { kCast, kOutside, kBehind };
-
-Fate vote(const Eigen::Vector3d& center, const Eigen::Vector3d& direction, double depth_m,
+void vote(const Eigen::Vector3d& center, const Eigen::Vector3d& direction, double depth_m,
           const ReferenceView& view, int plane, Dsi& dsi) {
   const double along = (depth_m - center.z()) / direction.z();
-  if (!(along > 0)) return Fate::kBehind;
+  if (!(along > 0)) return;
   const Eigen::Vector2d pixel = view.project(center + along * direction);
   const double left = std::floor(pixel.x());
   const double top = std::floor(pixel.y());
-  if (!(left >= 0 && left + 1 <= view.width - 1 && top >= 0 && top + 1 <= view.height - 1)) {
-    return Fate::kOutside;
-  }
+  if (!(left >= 0 && left + 1 <= view.width - 1 && top >= 0 && top + 1 <= view.height - 1)) return;
   for (int j = 0; j < 2; ++j) {
     for (int i = 0; i < 2; ++i) {
       const double weight_x = 1 - std::abs(pixel.x() - (left + i));
@@ -34,7 +30,6 @@ Fate vote(const Eigen::Vector3d& center, const Eigen::Vector3d& direction, doubl
       dsi.at(plane, static_cast<int>(left) + i, static_cast<int>(top) + j) += weight_x * weight_y;
     }
   }
-  return Fate::kCast;
 }
 
 }  // namespace
@@ -70,27 +65,15 @@ std::vector<PosedEvent> poseByPacket(const std::vector<Event>& events, const Pos
 }
 
 Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& undistortion,
-               const ReferenceView& view, const DepthPlanes& planes, VoteCounts* counts) {
+               const ReferenceView& view, const DepthPlanes& planes) {
   Dsi dsi(planes.size(), view);
-  VoteCounts all;
   for (const PosedEvent& posed : events) {
     const Eigen::Vector3d ray_cam = undistortion.ray(posed.event.x, posed.event.y).homogeneous();
     const Eigen::Vector3d direction = posed.T_ref_cam.rotation * ray_cam;
     for (int plane = 0; plane < planes.size(); ++plane) {
-      switch (vote(posed.T_ref_cam.translation, direction, planes.depth(plane), view, plane, dsi)) {
-        case Fate::kCast:
-          ++all.cast;
-          break;
-        case Fate::kOutside:
-          ++all.outside_view;
-          break;
-        case Fate::kBehind:
-          ++all.behind_camera;
-          break;
-      }
+      vote(posed.T_ref_cam.translation, direction, planes.depth(plane), view, plane, dsi);
     }
   }
-  if (counts != nullptr) *counts = all;
   return dsi;
 }
 

@@ -50,7 +50,7 @@ std::vector<PosedEvent> poseByPacket(const std::vector<Event>& events, const Pos
 
 /// The ray density of one camera's events (Ghosh and Gallego 2022, Eq. 2).
 Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& undistortion,
-               const ReferenceView& view, const DepthPlanes& planes, VoteCounts* counts = nullptr);
+               const ReferenceView& view, const DepthPlanes& planes);
 
 /// The mean of numbers under a rule, from its textbook formula.
 double fuse(FusionRule rule, const std::vector<double>& values);

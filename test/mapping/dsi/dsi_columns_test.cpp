@@ -4,16 +4,15 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "mapping/dsi/dsi_columns.h"
 #include "mapping/kernels/kernels.h"
 #include "mapping/sweep/space_sweep.h"
 #include "test/mapping/depth/same_image.h"
+#include "test/mapping/dsi/chosen_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/rays/random_rays.h"
 #include "test/mapping/sweep/sweep_case.h"
@@ -21,82 +20,25 @@
 namespace efm {
 namespace {
 
-using Planes = std::vector<PlaneValues>;
-
-/// Small whole numbers, so that many planes tie.
-Planes randomPlanes(std::mt19937& random, int planes, std::size_t pixels) {
-  Planes values(static_cast<std::size_t>(planes), PlaneValues(pixels));
-  for (auto& plane : values) {
-    for (float& value : plane) value = static_cast<float>(random() % 6);
-  }
-  return values;
-}
-
-/// The peaks of whole columns.
-DsiPeaks peaksOf(const Planes& planes, const ReferenceView& view) {
-  DsiPeaks peaks = unwrittenPeaks(view);
-  const std::size_t last = planes.size() - 1;
-  for (std::size_t i = 0; i < view.pixels(); ++i) {
-    std::size_t best = 0;
-    for (std::size_t p = 1; p <= last; ++p) {
-      if (planes[p][i] > planes[best][i]) best = p;
-    }
-    const auto pixel = static_cast<int>(i);
-    peaks.confidence(pixel / view.width, pixel % view.width) = planes[best][i];
-    peaks.plane(pixel / view.width, pixel % view.width) = static_cast<int>(best);
-    peaks.before(pixel / view.width, pixel % view.width) = best > 0 ? planes[best - 1][i] : -1;
-    peaks.after(pixel / view.width, pixel % view.width) = best < last ? planes[best + 1][i] : -1;
-  }
-  return peaks;
-}
-
-ReferenceView viewOf(int width, int height) {
-  ReferenceView view;
-  view.width = width;
-  view.height = height;
-  return view;
-}
-
 class RunningPeaksOn : public ::testing::TestWithParam<VotingKernel> {};
 
 INSTANTIATE_TEST_SUITE_P(Kernels, RunningPeaksOn, ::testing::ValuesIn(availableKernels()),
-                         [](const auto& test) { return std::string(nameOf(test.param)); });
+                         test::nameOfKernel);
 
 TEST_P(RunningPeaksOn, AreTheFirstLargestValueOfEachPixelAndItsNeighbours) {
   std::mt19937 random(1);
   for (int width = 1; width <= 70; ++width) {
-    const ReferenceView view = viewOf(width, 1);
-    const Planes planes = randomPlanes(random, 12, view.pixels());
-    RunningPeaks peaks(view.pixels(), GetParam());
-    for (std::size_t p = 0; p < planes.size(); ++p) peaks.add(static_cast<int>(p), planes[p]);
-    DsiPeaks images = unwrittenPeaks(view);
-    peaks.writeTo(images, {0, 0, width, 1});
-    EXPECT_TRUE(test::same(images, peaksOf(planes, view))) << width << " pixels";
-  }
-}
-
-TEST_P(RunningPeaksOn, TilesFillTheView) {
-  std::mt19937 random(3);
-  const ReferenceView view = viewOf(41, 23);
-  const Planes planes = randomPlanes(random, 9, view.pixels());
-  DsiPeaks images = unwrittenPeaks(view);
-  constexpr int kSide = 17;
-  for (int y = 0; y < view.height; y += kSide) {
-    for (int x = 0; x < view.width; x += kSide) {
-      const cv::Rect tile = cv::Rect(x, y, kSide, kSide) & cv::Rect(0, 0, view.width, view.height);
-      RunningPeaks peaks(static_cast<std::size_t>(tile.area()), GetParam());
-      for (std::size_t p = 0; p < planes.size(); ++p) {
-        PlaneValues values;
-        for (int row = tile.y; row < tile.br().y; ++row) {
-          const auto begin = planes[p].begin() + row * view.width + tile.x;
-          values.insert(values.end(), begin, begin + tile.width);
-        }
-        peaks.add(static_cast<int>(p), values);
-      }
-      peaks.writeTo(images, tile);
+    test::ChosenDsi dsi({width, 1}, 12);
+    for (float& value : dsi.values) value = static_cast<float>(random() % 6);  // many planes tie
+    RunningPeaks peaks(static_cast<std::size_t>(width), GetParam());
+    for (int plane = 0; plane < dsi.planes; ++plane) {
+      const auto begin = dsi.values.begin() + plane * width;
+      peaks.add(plane, PlaneValues(begin, begin + width));
     }
+    DsiPeaks images = unwrittenPeaks(ReferenceView{width, 1, 1, 1, 0, 0});
+    peaks.writeTo(images, {0, 0, width, 1});
+    EXPECT_TRUE(test::same(images, dsi.swept().peaks)) << width << " pixels";
   }
-  EXPECT_TRUE(test::same(images, peaksOf(planes, view)));
 }
 
 TEST_P(RunningPeaksOn, TheKernelTouchesNoPixelsButItsOwn) {
@@ -212,16 +154,21 @@ TEST_P(DsiColumnsOn, OfEachCameraAreThoseOfItsOwnSweep) {
   }
 }
 
-TEST_P(DsiColumnsOn, NoneAreThereWhereNoneAreAskedForAndTheConfidenceStaysTheSame) {
-  SweepCase input = stereoCase({80, 70}, 9, 5);
-  const test::SweepOutput with = sweep(input, GetParam());
-  input.column_window = 0;
-  const test::SweepOutput without = sweep(input, GetParam());
-  EXPECT_GT(with.result.fused.columns.size(), 100U);
-  EXPECT_EQ(without.result.fused.columns.size(), 0U);
-  const DsiPeaks& peaks = with.result.fused.peaks;
-  EXPECT_TRUE(test::same(peaks.confidence, without.result.fused.peaks.confidence));
-  EXPECT_TRUE(peaks.plane.empty() && peaks.before.empty() && peaks.after.empty());
+TEST_P(DsiColumnsOn, WithoutThemTheSweepHasPeaksWithTheirNeighboursAndTheSameConfidence) {
+  for (const int planes : {1, 2, 3, 9}) {
+    SweepCase input = stereoCase({80, 70}, planes, 5);
+    const test::SweepOutput with = sweep(input, GetParam());
+    input.column_window = 0;
+    const test::SweepOutput without = sweep(input, GetParam());
+    EXPECT_GT(with.result.fused.columns.size(), 100U);
+    EXPECT_EQ(without.result.fused.columns.size(), 0U);
+    const DsiPeaks& peaks = with.result.fused.peaks;
+    EXPECT_TRUE(test::same(peaks.confidence, without.result.fused.peaks.confidence));
+    EXPECT_TRUE(peaks.plane.empty() && peaks.before.empty() && peaks.after.empty());
+    test::ChosenDsi dsi({80, 70}, planes);
+    dsi.values = without.dsi;
+    EXPECT_TRUE(test::same(without.result.fused.peaks, dsi.swept().peaks)) << planes;
+  }
 }
 
 /// The Gaussian mean around each pixel of the whole view.
@@ -310,24 +257,6 @@ TEST(DsiColumns, HowABlurIsRoundedLosesNoPixelThatStandsOut) {
           << window << ", " << gradient;
     }
   }
-}
-
-TEST(DsiColumns, AddToAddsTheWeightedColumn) {
-  const cv::Mat1f confidence = cv::Mat1f::ones(1, 1) * 8;
-  TileVolume volume(3, 1);
-  volume.setPlane(0, {2});
-  volume.setPlane(1, {8});
-  volume.setPlane(2, {0});
-  std::vector<DsiColumns::Tile> tiles = {
-      DsiColumns::select({0, 0, 1, 1}, confidence, volume, 3, 5)};
-  const DsiColumns columns({1, 1}, 3, std::move(tiles));
-  ASSERT_TRUE(columns.has({0, 0}));
-  std::vector<float> sum = {10, 20, 30};
-  sum.resize(3 + kernels::kColumnPadding);
-  columns.addTo(sum.data(), {0, 0}, 0.5F);
-  sum.resize(3);
-  EXPECT_THAT(sum, ::testing::Pointwise(::testing::FloatNear(0.5F * toleranceOf(2, 8)),
-                                        {11.0F, 24.0F, 30.0F}));
 }
 
 }  // namespace

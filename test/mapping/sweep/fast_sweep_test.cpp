@@ -81,13 +81,15 @@ ExactVotes voteExactly(const RayBundle& rays, const ReferenceView& view, const D
   return votes;
 }
 
-/// Holds a fast kernel's counts and DSI against the plain one's, to the bounds that rounding gives:
-/// counts exactly but for votes at the border of the view.
+/// Of few votes some may all be rounded far: a shift of 1/4096 px in x and in y.
+constexpr double kMostPerVote = 4.0 / 4096 + 4.0 / 32'768;
+
+/// Holds a fast kernel's counts and DSI against the plain one's, to the bounds that rounding gives,
+/// and the plain one's counts against the exact ones: counts exactly but for votes at the border of
+/// the view.
 /// @param input fused by arithmetic means, in which errors neither grow nor vanish.
 void expectThePlainSweep(const test::SweepCase& input, VotingKernel kernel) {
-  // Of few votes some may all be rounded far: a shift of 1/4096 px in x and in y.
   constexpr double kFewVotes = 1000;
-  constexpr double kMostPerVote = 4.0 / 4096 + 4.0 / 32'768;
   const test::SweepOutput fast = sweep(input, kernel, 2);
   const test::SweepOutput plain = sweep(input, VotingKernel::kPlain, 2);
   double at_border = 0;
@@ -96,18 +98,23 @@ void expectThePlainSweep(const test::SweepCase& input, VotingKernel kernel) {
   for (std::size_t c = 0; c < input.cameras.size(); ++c) {
     double camera_at_border = 0;
     std::uint64_t rays = 0;
+    VoteCounts exact_counts;
     for (const RayBundle& bundle : input.cameras[c]) {
       const ExactVotes exact = voteExactly(bundle, input.view, input.planes);
       camera_at_border += static_cast<double>(exact.at_border);
       float_shift_px += exact.float_shift_px;
       rays += bundle.size();
+      exact_counts += exact.counts;
     }
     at_border += camera_at_border;
     const VoteCounts& counts = fast.result.votes[c];
     const VoteCounts& plain_counts = plain.result.votes[c];
     EXPECT_EQ(counts.total(), rays * static_cast<std::uint64_t>(input.planes.size()));
     EXPECT_EQ(counts.behind_camera, plain_counts.behind_camera);
+    EXPECT_EQ(plain_counts.behind_camera, exact_counts.behind_camera);
     EXPECT_NEAR(static_cast<double>(counts.cast), static_cast<double>(plain_counts.cast),
+                camera_at_border);
+    EXPECT_NEAR(static_cast<double>(plain_counts.cast), static_cast<double>(exact_counts.cast),
                 camera_at_border);
     cast += static_cast<double>(plain_counts.cast);
   }
@@ -350,9 +357,11 @@ TEST_P(FastSweepOn, RaysOnEveryBorderOfTilesAndTheViewAreCountedOnce) {
       }
     }
   }
-  const auto fast = sweep(caseOf(planes, test::raysFromOrigin(all), view), GetParam());
+  const RayBundle rays = test::raysFromOrigin(all);
+  const auto fast = sweep(caseOf(planes, rays, view), GetParam());
   EXPECT_EQ(fast.result.votes[0].cast, 3 * inside.size());
   EXPECT_EQ(fast.result.votes[0].total(), 3 * all.size());
+  EXPECT_LE(test::differenceOf(fast.dsi, voteExactly(rays, view, planes).dsi).error, kMostPerVote);
 }
 
 TEST_P(FastSweepOn, RaysThatCrossBordersOfTilesFromPlaneToPlaneAreNeverLost) {

@@ -3,8 +3,6 @@
 #include <Eigen/Core>
 
 #include <algorithm>
-#include <limits>
-#include <numeric>
 #include <random>
 #include <vector>
 
@@ -156,92 +154,6 @@ TEST_P(TileAccumulatorOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
     EXPECT_EQ(votes.units, std::uint64_t{kVotes} * 63 * 63 * kUnitsOfVote);
     // The four weights around a pixel are those of one vote, whatever the fraction.
     for (const float density : votes.density) ASSERT_NEAR(density, kVotes, 1e-4) << fraction;
-  }
-}
-
-TEST_P(TileAccumulatorOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
-  std::mt19937 random(1);
-  for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 20'000U}) {
-    std::uniform_int_distribution<int> x(-10 * 4096, 160 * 4096);
-    std::uniform_int_distribution<int> y(-10 * 4096, 140 * 4096);
-    Points points;
-    for (std::size_t i = 0; i < count; ++i) {
-      points.emplace_back(x(random) / 4096.0, y(random) / 4096.0);
-    }
-    const TileVotes fast = voteOnView(GetParam(), points);
-    const VotesOneByOne plain = voteOneByOne(points);
-    EXPECT_EQ(fast.units, plain.votes * kUnitsOfVote);
-    for (std::size_t i = 0; i < plain.density.size(); ++i) {
-      // Some four votes around a pixel: a dozen at most.
-      ASSERT_NEAR(fast.density[i], plain.density[i], 12 * kWeightError) << "of " << count;
-    }
-  }
-}
-
-TEST_P(TileAccumulatorOn,
-       ARayOnABorderOfTilesOrTheViewIsCountedOnceAndFallsWhereThePlainKernelsDoes) {
-  std::vector<double> columns;
-  for (const double border : {0.0, 49.0, 50.0, 99.0, 100.0, 148.0, 149.0}) {
-    for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) columns.push_back(border + off);
-  }
-  std::vector<double> rows;
-  for (const double border : {0.0, 42.0, 43.0, 85.0, 86.0, 128.0, 129.0}) {
-    for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) rows.push_back(border + off);
-  }
-  for (const double x : columns) {
-    for (const double y : rows) expectPlainVotes(GetParam(), {{x, y}}, kWeightError);
-  }
-}
-
-TEST_P(TileAccumulatorOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (const double wrong : {kNan, -kNan, kInfinity, -kInfinity, 1e30, -1e30, 1e6, -1e6, 2048.0,
-                             -2048.0, 1024.0, -1024.0, 4096.0, 1048576.0, -1048576.0}) {
-    for (const auto& point : Points{{wrong, 20}, {20, wrong}, {wrong, wrong}}) {
-      const TileVotes votes = voteOnView(GetParam(), Points(100, point));
-      EXPECT_EQ(votes.units, 0U) << wrong;
-      EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 0) << wrong;
-    }
-  }
-}
-
-TEST_P(TileAccumulatorOn, RaysMoveAlongTheirShiftToThePlane) {
-  TileAccumulator accumulator(GetParam());
-  const TileCells cells({0, 0, 50, 43}, test::kTiledView);
-  accumulator.moveTo(cells);
-  TileRays rays = test::raysAt({{10, 10}}, cells.origin);
-  rays.view().dx[0] = 4 * test::kTileUnit;
-  rays.view().dy[0] = -2 * test::kTileUnit;
-  std::vector<float> density(static_cast<std::size_t>(cells.tile.area()), -1.0F);
-  for (const double to_plane : {-1.0, 0.0, 0.5, 4.0}) {
-    accumulator.vote(rays, to_plane);
-    EXPECT_EQ(accumulator.resolve(density.data()), kUnitsOfVote);
-    const int x = static_cast<int>(10 + 4 * to_plane);
-    const int y = static_cast<int>(10 - 2 * to_plane);
-    EXPECT_EQ(density[static_cast<std::size_t>(y * 50 + x)], 1.0F) << to_plane;
-  }
-}
-
-TEST_P(TileAccumulatorOn, NothingIsLeftOfEarlierTilesAndPlanes) {
-  TileAccumulator used(GetParam());
-  const cv::Rect large(0, 0, 63, 63);
-  for (const cv::Rect tile : {large, cv::Rect(100, 100, 1, 1), cv::Rect(149, 0, 1, 63),
-                              cv::Rect(60, 129, 17, 1), cv::Rect(148, 128, 2, 2), large}) {
-    Points full;  // of the tile and of its neighbours
-    for (int vote = 0; vote < 70; ++vote) {
-      for (int y = tile.y - 2; y <= tile.br().y + 2; ++y) {
-        for (int x = tile.x - 2; x <= tile.br().x + 2; ++x) full.emplace_back(x + 0.5, y + 0.5);
-      }
-    }
-    voteWith(used, tile, full);
-    const Points few = {
-        {1.0 * tile.x, 1.0 * tile.y}, {tile.x + 0.5, tile.y + 0.25}, {tile.x - 0.5, tile.y - 0.5}};
-    TileAccumulator unused(GetParam());
-    const TileVotes after = voteWith(used, tile, few);
-    const TileVotes alone = voteWith(unused, tile, few);
-    EXPECT_EQ(after.units, alone.units) << "tile " << tile.x << ", " << tile.y;
-    EXPECT_EQ(after.density, alone.density) << "tile " << tile.x << ", " << tile.y;
   }
 }
 
