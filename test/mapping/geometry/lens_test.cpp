@@ -27,26 +27,12 @@ CameraModel davis346(DistortionModel distortion, std::vector<double> coefficient
   return {346, 260, 226.38, 226.15, 174, 133, distortion, std::move(coefficients)};
 }
 
-TEST(Undistortion, EveryRayProjectsBackToItsPixel) {
-  // Real lenses: a DAVIS240C's, once without k3, and a DAVIS346's fisheye.
+TEST(Undistortion, ThePrincipalPointLooksAlongTheAxis) {
   for (const CameraModel& model :
        {davis346(DistortionModel::kNone, {}),
         davis346(DistortionModel::kRadtan, {-0.1386, 0.0934, -0.00034, 0.00017}),
-        davis346(DistortionModel::kRadtan, {-0.1386, 0.0934, -0.00034, 0.00017, 0.002}),
         davis346(DistortionModel::kEquidistant, {-0.0480, 0.0113, -0.0554, 0.0215})}) {
-    const UndistortionTable table(model);
-    double largest_px = 0;
-    for (int y = 0; y < model.height; ++y) {
-      for (int x = 0; x < model.width; ++x) {
-        const Eigen::Vector2d pixel = model.project(table.ray(x, y).homogeneous());
-        largest_px = std::max(largest_px, (pixel - Eigen::Vector2d(x, y)).norm());
-      }
-    }
-    // The iteration stops at 1e-9 px or better. What is left is the rounding to floats: 2^-25 of
-    // offsets of up to 200 px from the principal point, a thousandth of a packet's error.
-    EXPECT_LT(largest_px, 2e-5) << nameOf(model.distortion);
-    EXPECT_TRUE(table.outsideLens().empty());
-    EXPECT_EQ(table.ray(174, 133), Eigen::Vector2d(0, 0));
+    EXPECT_EQ(UndistortionTable(model).ray(174, 133), Eigen::Vector2d(0, 0));
   }
 }
 
@@ -249,6 +235,7 @@ constexpr auto kEquidistant = DistortionModel::kEquidistant;
 
 /// All with the centre between pixels, so that four pixels are alike.
 const std::vector<Lens> kLenses = {
+    {"no distortion", 226, DistortionModel::kNone, {0, 0, 0}, true},
     {"strong barrel, invertible everywhere", 180, kRadtan, {-0.45, 0.2, 0}, true},
     {"strong barrel with k3", 170, kRadtan, {-0.6, 0.5, -0.1}, true},
     {"folds over", 230, kRadtan, {-0.5, 0, 0}, false},
@@ -264,6 +251,7 @@ CameraModel cameraOf(const Lens& lens) {
   const std::vector<double>& k = lens.radial;
   std::vector<double> coefficients = k;
   if (lens.distortion == kRadtan) coefficients = {k[0], k[1], 0, 0, k[2]};
+  if (lens.distortion == DistortionModel::kNone) coefficients.clear();
   return {346, 260, lens.focal_px, lens.focal_px, 172.5, 129.5, lens.distortion, coefficients};
 }
 
@@ -391,7 +379,7 @@ TEST(LensInverse, TangentialDistortionIsInvertedOnTheBranchOfTheCentre) {
 }
 
 TEST(LensInverse, ALensThatProjectsNothingToTheSensorIsRefused) {
-  CameraModel model = cameraOf(kLenses[2]);
+  CameraModel model = cameraOf(kLenses[3]);
   model.cx = 2000;
   EXPECT_THAT([&] { UndistortionTable{model}; },
               ThrowsMessage<std::invalid_argument>(HasSubstr("no pixel")));

@@ -10,11 +10,13 @@
 #include "mapping/events/event.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
+#include "test/mapping/keyframes/played_recording.h"
 #include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::keyframe_mapper_test {
 namespace {
 
+using test::map;
 using test::same;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -31,14 +33,6 @@ KeyframeMapperOptions fewPlanes(int subintervals = 1) {
   options.subintervals.count = subintervals;
   options.sweep.threads = 1;
   return options;
-}
-
-KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
-                     const KeyframeMapperOptions& options) {
-  KeyframeMapper mapper(recording.rig, cameras, options);
-  const auto keyframe = mapper.map(Recording::kWindow, recording.spans(), recording.trajectory);
-  EXPECT_TRUE(keyframe);
-  return keyframe.value_or(KeyframeDepthMap());
 }
 
 TEST(KeyframeMapper, AnUnselectedReferenceGivesTheViewButNoneOfItsEvents) {

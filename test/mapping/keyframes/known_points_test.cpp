@@ -17,12 +17,14 @@
 #include "mapping/keyframes/keyframe_policy.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/keyframes/played_recording.h"
 #include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/motion/moving_edges.h"
 
 namespace efm::keyframe_defaults_test {
 namespace {
 
+using test::map;
 using test::MovingEdges;
 using test::same;
 using ::testing::ElementsAre;
@@ -35,15 +37,6 @@ KeyframeMapperOptions defaults() {
   options.planes = kPlanes;
   options.sweep.threads = 1;
   return options;
-}
-
-template <typename Recording>
-KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
-                     const KeyframeMapperOptions& options) {
-  KeyframeMapper mapper(recording.rig, cameras, options);
-  const auto keyframe = mapper.map(Recording::kWindow, recording.spans(), recording.trajectory);
-  EXPECT_TRUE(keyframe);
-  return keyframe.value_or(KeyframeDepthMap());
 }
 
 KeyframeDepthMap map(const MovingEdges& recording, const KeyframeMapperOptions& options) {

@@ -11,9 +11,21 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::test {
+
+/// The keyframe of a recording of one window: `RandomRecording`, or any with its members.
+template <typename Recording>
+KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
+                     const KeyframeMapperOptions& options, DsiSink* sink = nullptr) {
+  KeyframeMapper mapper(recording.rig, cameras, options);
+  const auto keyframe =
+      mapper.map(Recording::kWindow, recording.spans(), recording.trajectory, sink);
+  EXPECT_TRUE(keyframe);
+  return keyframe.value_or(KeyframeDepthMap());
+}
 
 /// The output of a mapper for a recording.
 struct Played {

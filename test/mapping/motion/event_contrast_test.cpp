@@ -318,16 +318,6 @@ TEST(EventContrast, IsTheSquareOfTheHarmonicMeanOfSmoothImages) {
   }
 }
 
-TEST(EventContrast, CamerasMustMeet) {
-  auto events = randomEvents(9, 2, 100);
-  for (WarpedEvent& event : events[0]) event.pixel = {20, 20};
-  for (WarpedEvent& event : events[1]) event.pixel = {40, 20};
-  Eigen::VectorXd gradient;
-  const EventContrast missing(events, kView, kPatchPx);
-  EXPECT_EQ(missing.at(Eigen::VectorXd::Zero(missing.variables()), gradient), 0);
-  EXPECT_TRUE(gradient.isZero());
-}
-
 TEST(EventContrast, OnlyPatchesWithEventsAreVariables) {
   auto events = randomEvents(10, 2, 8);
   const Eigen::Vector2f pixels[] = {{5, 5},   {15.9F, 5}, {16, 5},  {5, 16},

@@ -10,6 +10,7 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/motion/motion_correction.h"
 #include "test/mapping/depth/same_image.h"
+#include "test/mapping/keyframes/played_recording.h"
 #include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/motion/moving_edges.h"
 
@@ -69,6 +70,7 @@ TEST(QuasiNewton, StaysOnAFlatFunctionAndGoesOnDownASlope) {
 
 namespace {
 
+using test::map;
 using test::MovingEdges;
 using test::RandomRecording;
 using test::same;
@@ -79,16 +81,6 @@ KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   options.sweep.threads = threads;
   options.motion.correct_motion = correct_motion;
   return options;
-}
-
-template <typename Recording>
-KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
-                     const KeyframeMapperOptions& options, DsiSink* sink = nullptr) {
-  KeyframeMapper mapper(recording.rig, cameras, options);
-  const auto keyframe =
-      mapper.map(Recording::kWindow, recording.spans(), recording.trajectory, sink);
-  EXPECT_TRUE(keyframe);
-  return keyframe.value_or(KeyframeDepthMap());
 }
 
 /// Edges as seen by a tracker that turns and slides.
