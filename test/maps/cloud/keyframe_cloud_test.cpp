@@ -9,9 +9,12 @@
 
 #include "maps/cloud/keyframe_cloud.h"
 #include "test/maps/cloud/cloud_points.h"
+#include "test/maps/refinement/random_poses.h"
 
 namespace efm {
 namespace {
+
+using test::drawMotion;
 
 /// A view of 3 x 2 pixels, f = 2, principal point (1, 0), without any depth.
 KeyframeDepthMap smallKeyframe() {
@@ -82,20 +85,6 @@ TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRefused) {
   }
 }
 
-Rigid3 randomPose(std::mt19937& random, double extent_m, double extent_rad) {
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  const auto draw = [&] {
-    const double x = uniform(random);
-    const double y = uniform(random);
-    return Eigen::Vector3d(x, y, uniform(random));
-  };
-  const Eigen::Vector3d rotation = extent_rad * draw();
-  Rigid3 T_world_ref;
-  T_world_ref.rotation = Eigen::AngleAxisd(rotation.norm(), rotation.normalized());
-  T_world_ref.translation = extent_m * draw();
-  return T_world_ref;
-}
-
 /// Points in front of a view, on a surface that all views share.
 std::vector<ViewPoint> randomPoints(std::mt19937& random, std::size_t count) {
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -140,7 +129,7 @@ RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
   const std::size_t fixed = random() % 4;
   for (std::size_t i = 0; i < fixed; ++i) {
     keyframes.points.push_back(randomPoints(random, random() % 80));
-    keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+    keyframes.T_world_ref.push_back(drawMotion(0.2, 0.1, random));
     cloud.insertFixed(pointsInWorld(keyframes.points[i], keyframes.T_world_ref[i]),
                       keyframes.T_world_ref[i]);
   }
@@ -150,13 +139,13 @@ RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
     const unsigned what = random() % 4;
     if (what == 0 || count == 0) {
       keyframes.points.push_back(randomPoints(random, random() % 80));
-      keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+      keyframes.T_world_ref.push_back(drawMotion(0.2, 0.1, random));
       asked.push_back(keyframes.T_world_ref.back());
       cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
     } else if (what < 3) {
       const std::size_t moved = random() % count;
       const double extent = std::pow(10.0, -static_cast<double>(random() % 5));
-      asked[fixed + moved] = asked[fixed + moved] * randomPose(random, extent, extent);
+      asked[fixed + moved] = asked[fixed + moved] * drawMotion(extent, extent, random);
       cloud.move({{moved, asked[fixed + moved]}});
     } else {
       cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
@@ -200,7 +189,7 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
   RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
   std::mt19937 random(2);
   for (int i = 0; i < 200; ++i) {
-    const Rigid3 T_world_ref = randomPose(random, 1, 1);
+    const Rigid3 T_world_ref = drawMotion(1, 1, random);
     Rigid3 T_nearest_ref = T_world_ref;
     T_nearest_ref.rotation.x() = std::nextafter(T_nearest_ref.rotation.x(), 2);
     cloud.insert({{{0, 0, 2}, 1}}, T_world_ref);
@@ -267,11 +256,11 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
   for (std::size_t k = 0; k < 32; ++k) {
     // Five keyframes make the 200,000 voxels that are worth a merge.
     keyframes.points.push_back(randomPoints(random, k % 12 < 5 ? 42'000 : 500));
-    cloud.insert(keyframes.points.back(), randomPose(random, 0.1, 0.1));
+    cloud.insert(keyframes.points.back(), drawMotion(0.1, 0.1, random));
     // The newest one, the oldest that may move, and some of all.
-    std::map<std::size_t, Rigid3> moves{{k, randomPose(random, 0.1, 0.1)}};
-    if (k >= kMovable) moves[k - kMovable] = randomPose(random, 0.1, 0.1);
-    for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = randomPose(random, 0.1, 0.1);
+    std::map<std::size_t, Rigid3> moves{{k, drawMotion(0.1, 0.1, random)}};
+    if (k >= kMovable) moves[k - kMovable] = drawMotion(0.1, 0.1, random);
+    for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = drawMotion(0.1, 0.1, random);
     cloud.move(moves);
     if (k % 3 != 2) continue;  // others stay pending while keyframes are settled
     cloud.applyPending(0);
@@ -303,7 +292,7 @@ TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
     GlobalCloud same(options);
     for (std::size_t k = 0; k < 24; ++k) {
       const std::vector<ViewPoint> points = randomPoints(random, k < 6 ? 42'000 : 500);
-      const Rigid3 T_world_ref = randomPose(random, 0.1, 0.1);
+      const Rigid3 T_world_ref = drawMotion(0.1, 0.1, random);
       const std::vector<CloudPoint> in_world = pointsInWorld(points, T_world_ref);
       k < of_earlier_map ? cloud.insertFixed(in_world, T_world_ref)
                          : cloud.insert(points, T_world_ref);
@@ -321,11 +310,11 @@ TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
   PosedKeyframes keyframes;
   for (int i = 0; i < 3; ++i) {
     keyframes.points.push_back(randomPoints(random, 50));
-    keyframes.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
+    keyframes.T_world_ref.push_back(drawMotion(0.1, 0.1, random));
     cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
   }
   cloud.insert(randomPoints(random, 50), {});
-  cloud.move({{3, randomPose(random, 1, 1)}});
+  cloud.move({{3, drawMotion(1, 1, random)}});
   cloud.removeNewest();
   cloud.applyPending(0);
   EXPECT_EQ(cloud.T_world_ref().size(), 3U);
@@ -338,7 +327,7 @@ TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
     EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
     EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
   }
-  keyframes.T_world_ref[1] = randomPose(random, 0.1, 0.1);
+  keyframes.T_world_ref[1] = drawMotion(0.1, 0.1, random);
   cloud.move({{1, keyframes.T_world_ref[1]}});
   cloud.applyPending(0);
   EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));

@@ -33,25 +33,17 @@ std::vector<std::pair<double, double>> paired(const std::vector<int>& estimate_m
   return pairs;
 }
 
-TEST(AssociatePoses, EachPoseOfTheShorterIsPairedWithTheNearestInTime) {
+TEST(AssociatePoses, EachPoseOfTheShorterIsPairedWithTheNearestInTimeUpToTheLimit) {
   EXPECT_THAT(paired({12, 48}, {0, 10, 20, 30, 40, 50}, 0.01),
               ElementsAre(Pair(12, 10), Pair(48, 50)));
   EXPECT_THAT(paired({0, 10, 20, 30, 40, 50}, {12, 48}, 0.01),
               ElementsAre(Pair(10, 12), Pair(50, 48)));
-}
-
-TEST(AssociatePoses, TheLimitIsIncludedAndBeyondThereIsNoPair) {
   EXPECT_THAT(paired({110, 200}, {100, 211, 300}, 0.010), ElementsAre(Pair(110, 100)));
+  EXPECT_THAT(paired({15}, {10, 20}, 0.01), ElementsAre(Pair(15, 10))) << "of two the earlier";
+  EXPECT_THAT(paired({40, 10}, {41, 11, 77}, 0.01), ElementsAre(Pair(10, 11), Pair(40, 41)))
+      << "in any order";
   EXPECT_TRUE(paired({1}, {}, 1).empty());
   EXPECT_TRUE(paired({}, {}, 1).empty());
-}
-
-TEST(AssociatePoses, OfTwoAtTheSameDistanceTheEarlierIsTaken) {
-  EXPECT_THAT(paired({15}, {10, 20}, 0.01), ElementsAre(Pair(15, 10)));
-}
-
-TEST(AssociatePoses, TakesPosesInAnyOrder) {
-  EXPECT_THAT(paired({40, 10}, {41, 11, 77}, 0.01), ElementsAre(Pair(10, 11), Pair(40, 41)));
 }
 
 TEST(AssociatePoses, RefusesAnInvalidLimit) {

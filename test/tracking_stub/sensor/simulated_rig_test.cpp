@@ -127,8 +127,6 @@ TEST_F(OnePixel, StampsWholeMicrosecondsAlsoOfALargeClock) {
   }
 }
 
-TEST_F(OnePixel, IsSilentWithoutAChange) { EXPECT_TRUE(step({0, 1'000'000}, 1.0F, 1.0F).empty()); }
-
 std::vector<Event> fireAll(EventPixels& pixels, const cv::Mat1f& from, const cv::Mat1f& to) {
   std::vector<Event> events;
   for (int y = 0; y < from.rows; ++y) pixels.fireRow(y, {0, 1'000'000}, from, to, events);
