@@ -180,21 +180,6 @@ TEST(CEventFusionMapBuilder, RefinedKeyframesMoveInMrptsMapsAndCorrectThePose) {
   EXPECT_GT(builder.status().refinement->T_world_odom.translation.norm(), 1e-4);
 }
 
-TEST(CEventFusionMapBuilder, ThePoseOfTheSensorOnTheRigIsRemoved) {
-  const Samples samples = samplesOf(SyntheticRecording());
-  const auto observations = observationsOf(samples);
-  const mrpt::poses::CPose3D sensor_on_rig(0.1, -0.5, 0.2, 1.5, 0, 0);
-  for (const auto& observation : observations) {
-    auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
-    if (!pose) continue;
-    pose->sensorPose = sensor_on_rig;
-    pose->pose.mean = pose->pose.mean + sensor_on_rig;
-  }
-  CEventFusionMapBuilder builder(syntheticOptions());
-  play(builder, observations);
-  expectNear(builder.points(), mapOf(syntheticOptions(), samples)->points, 1e-6);
-}
-
 TEST(CEventFusionMapBuilder, RejectsWhatItCannotUseAndDoesNotStartOver) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
@@ -297,16 +282,6 @@ TEST_P(BuilderInEitherMode, WhileUpdatingIsDisabledPacketsAreSkippedAndThePoseGo
   EXPECT_EQ(status.counts.total().read, 0U);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 0U);
   EXPECT_NEAR(estimateOf(builder).mean.x(), 0.8 * 0.4, 1e-9);
-}
-
-TEST_P(BuilderInEitherMode, ACommentEndsTheRecording) {
-  CEventFusionMapBuilder builder(in());
-  feed(builder, observationsOf(SyntheticRecording(0.215)));  // its window ends with the recording
-  auto comment = mrpt::obs::CObservationComment::Create();
-  comment->text = "event_fusion: finish";
-  builder.processObservation(comment);
-  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 1U);
-  EXPECT_EQ(builder.ignoredObservations(), 0U);
 }
 
 TEST_P(BuilderInEitherMode, ABadObservationInAFrameTakesNoOtherWithIt) {

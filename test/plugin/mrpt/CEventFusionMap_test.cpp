@@ -177,7 +177,7 @@ TEST(CEventFusionMap, IgnoresOtherObservations) {
   EXPECT_FALSE(map.canComputeObservationLikelihood(mrpt::obs::CObservationComment()));
 }
 
-TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChange) {
+TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChangeWhichAClearedOneDoesAndNotItsCopies) {
   CEventFusionMap map = mapOf(2);
   const CEventFusionMap before = map;
   StoredKeyframe wrong = randomKeyframe(5);
@@ -187,6 +187,10 @@ TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChange) {
   EXPECT_THROW(map.insertKeyframe(wrong), std::invalid_argument);
   expectSamePoints(map, before);
   EXPECT_EQ(map.keyframes().size(), 2U);
+  map.clear();
+  EXPECT_TRUE(map.isEmpty() && map.keyframes().empty());
+  EXPECT_EQ(map.cloud().options().voxel_size_m, 0.25);
+  expectSamePoints(before, mapOf(2));
 }
 
 TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
@@ -290,16 +294,6 @@ TEST(CEventFusionMap, IsDrawnInColoursUpToTheNinetyFifthPercentile) {
   map.genericMapParams.enableSaveAs3DObject = false;
   EXPECT_TRUE(map.getVisualization()->empty());
   EXPECT_EQ(CEventFusionMap().getVisualization()->size(), 1U) << "an empty cloud";
-}
-
-TEST(CEventFusionMap, CopiesAreIndependent) {
-  CEventFusionMap map = mapOf(2);
-  const CEventFusionMap copy = map;
-  map.clear();
-  EXPECT_TRUE(map.isEmpty());
-  EXPECT_TRUE(map.keyframes().empty());
-  expectSamePoints(copy, mapOf(2));
-  EXPECT_EQ(map.cloud().options().voxel_size_m, 0.25);
 }
 
 TEST(CEventFusionMap, WarnsWhereMrptsFloatsRoundItsPoints) {

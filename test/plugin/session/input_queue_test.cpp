@@ -219,7 +219,9 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
     add(expected.back());
     if (ahead) add(expected.back() + 100'000'000'000);
     wrong += ahead ? 1 : 0;
-    if (ends_packet) queue.add(std::exchange(next, packet(0, 0, 0)));
+    if (!ends_packet) continue;
+    next.covered_until_ns = next.events.back().t_ns;  // of one far ahead, too
+    queue.add(std::exchange(next, packet(0, 0, 0)));
   }
   for (int i = 0; i < 2; ++i) {  // the last ones are confirmed, too
     expected.push_back(expected.back() + 1);
@@ -232,6 +234,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   std::vector<std::int64_t> poses_ns;
   for (const EventPacket& one : batch.packets) {
     for (const Event& event : one.events) events_ns.push_back(event.t_ns);
+    RC_ASSERT(one.covered_until_ns.value_or(0) <= expected.back());
   }
   for (const PoseSample& pose : batch.poses) poses_ns.push_back(pose.t_ns);
   RC_ASSERT(events_ns == expected);

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/plugin/session/session_driver.h"
 
 namespace efm {
@@ -66,70 +66,6 @@ TEST(LiveGuard, HoldsThePosesAfterAMotionThatNothingExplains) {
     EXPECT_FALSE(guard.holdsPose(poseOf(500, 99))) << "a segment begins anywhere";
     EXPECT_EQ(guard.status()->pose_jumps, 1U);
   }
-}
-
-TEST(LiveGuard, AClockIsResetByASecondOfOlderDataUnlessItIsWrongAlone) {
-  struct Report {
-    int sensor;
-    std::int64_t t_ms;
-    bool is_older;
-  };
-  struct Row {
-    const char* what;
-    std::vector<Report> reports;
-    bool is_reset;
-  };
-  const Row rows[] = {
-      {"less than a second", {{0, 100, true}, {0, 1099, true}}, false},
-      {"a second", {{0, 100, true}, {0, 1100, true}}, true},
-      {"two sensors, less than a second each", {{0, 100, true}, {1, 1100, true}}, false},
-      {"data in time between", {{0, 100, true}, {0, 9000, false}, {0, 1100, true}}, false},
-      {"another camera goes on", {{0, 100, true}, {1, 9000, false}, {0, 1100, true}}, false},
-      {"it goes back, too",
-       {{0, 100, true}, {1, 9000, false}, {1, 500, true}, {0, 1100, true}},
-       true},
-      {"it is not ahead", {{0, 100, true}, {1, 2000, false}, {0, 1100, true}}, true},
-      {"the tracker",
-       {{LiveGuard::kTracker, 100, true}, {1, 9000, false}, {LiveGuard::kTracker, 1100, true}},
-       true},
-      {"the tracker goes on",
-       {{0, 100, true}, {LiveGuard::kTracker, 9000, false}, {0, 1100, true}},
-       true},
-  };
-  for (const Row& row : rows) {
-    LiveGuard guard = liveGuard();
-    LiveGuard playback{LiveOptions{}};
-    for (const Report& report : row.reports) {
-      for (LiveGuard* one : {&guard, &playback}) {
-        report.is_older ? one->noteOlder(report.sensor, report.t_ms * kMillisecond)
-                        : one->noteInTime(report.sensor, report.t_ms * kMillisecond);
-      }
-    }
-    EXPECT_EQ(guard.clockWentBack(), row.is_reset) << row.what;
-    EXPECT_FALSE(playback.clockWentBack()) << row.what;
-  }
-}
-
-TEST(LiveGuard, InputOfTheNewClockIsHeldInOrderAndTheFormerOneForgotten) {
-  LiveGuard guard = liveGuard();
-  guard.notePose(poseOf(9000, 0).pose);
-  guard.noteOlderPose(8500 * kMillisecond);
-  guard.noteOlderPose(9400 * kMillisecond);
-  EXPECT_FALSE(guard.clockWentBack()) << "not over a second old";
-  guard.noteOlderPose(1000 * kMillisecond);
-  guard.noteOlderPose(2000 * kMillisecond);
-  ASSERT_TRUE(guard.clockWentBack());
-  guard.noteMissing(0, {kMaxTimeNs, DropReason::kPaused});
-  std::string order;
-  guard.hold([&] { order += "a"; }, 5);
-  guard.hold([&] { order += "b"; }, 2);
-  EXPECT_EQ(guard.heldEvents(), 7U);
-  for (const auto& input : guard.beginClock()) input();
-  EXPECT_EQ(order, "ab");
-  EXPECT_EQ(guard.heldEvents(), 0U);
-  EXPECT_FALSE(guard.clockWentBack());
-  EXPECT_FALSE(guard.holdsPose(poseOf(10, 99))) << "it is the first one of this clock";
-  EXPECT_EQ(guard.status()->clock_steps, 1U);
 }
 
 /// A mapper with the recording's poses and its events of the first half second.

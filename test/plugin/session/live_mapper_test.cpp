@@ -166,39 +166,6 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
       << "no window lacks a part of its events";
 }
 
-TEST(LiveMapper, AJumpEndsASegmentUnlessItsNoiseExplainsIt) {
-  Samples samples = samplesOf(SyntheticRecording(1.2));
-  const std::int64_t jump_ns = SyntheticRecording::kStartNs + 650 * kMsNs;
-  const std::set<std::int64_t> all = timesOf(*mapOf(syntheticOptions(), samples));
-  for (Sample& sample : samples) {
-    auto* const pose = std::get_if<PoseSample>(&sample);
-    if (pose != nullptr && pose->t_ns >= jump_ns) pose->T_world_body.translation.x() += 10;
-  }
-  for (const bool is_noise : {false, true}) {
-    for (Sample& sample : samples) {
-      auto* const pose = std::get_if<PoseSample>(&sample);
-      if (pose != nullptr && is_noise) pose->noise = PoseNoise{3, 3};
-    }
-    EventFusionOptions options = live();
-    options.refinement.enabled = !is_noise;
-    Mapper mapper(options);
-    play(mapper, samples);
-    const SessionStatus status = mapper.status();
-    expectSumsAgree(status);
-    EXPECT_EQ(status.live->pose_jumps, is_noise ? 0U : 1U);
-    if (is_noise) continue;
-    EXPECT_EQ(status.refinement->failures, 0U);
-    const std::set<std::int64_t> times = timesOf(*mapper.snapshot());
-    for (const std::int64_t t_ns : all) {  // windows of 0.2 s around t_ns
-      const bool spans = t_ns - 100 * kMsNs < jump_ns && t_ns + 100 * kMsNs > jump_ns - 10 * kMsNs;
-      EXPECT_EQ(times.count(t_ns), spans ? 0U : 1U) << t_ns;
-    }
-    for (const StampedPose& keyframe : mapper.snapshot()->trajectory) {  // the rig moves by 1 m
-      EXPECT_EQ(keyframe.T_world_rig.translation.x() > 5, keyframe.t_ns > jump_ns);
-    }
-  }
-}
-
 TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   const SyntheticRecording recording(1.3);
   const auto at = [&](std::int64_t since_start_s) {
@@ -296,47 +263,6 @@ TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnEr
                 testing::MatchesRegex("a window needs [0-9]+ events, the queue holds 2000: "
                                       "expected smaller windows .*"));
     EXPECT_GE(log.count(status.live->too_large), 1U);
-  }
-}
-
-TEST(LiveMapper, AnEventOrAPoseThatIsFarAheadIsRejectedAlone) {
-  const Samples samples = samplesOf(SyntheticRecording(1.5));
-  const auto expected = mapOf(syntheticOptions(), samples);
-  for (const bool is_within : {true, false}) {  // the packet, or at its end
-    std::size_t events = 0;
-    std::size_t poses = 0;
-    Samples wrong;
-    for (const Sample& sample : samples) {
-      Sample changed = sample;
-      auto* const packet = std::get_if<EventPacket>(&changed);
-      const bool is_wrong = wrong.size() % 50 < 2;
-      if (is_wrong && packet == nullptr) {
-        std::get<PoseSample>(changed).t_ns += 100'000 * kMsNs;
-        wrong.push_back(changed);
-        ++poses;
-        changed = sample;  // follows
-      } else if (is_wrong && packet->events.size() > 2) {
-        Event ahead = packet->events.back();
-        ahead.t_ns += 100'000 * kMsNs;
-        packet->events.insert(packet->events.end() - (is_within ? 1 : 0), ahead);
-        if (!is_within) packet->covered_until_ns = ahead.t_ns + 1;
-        ++events;
-      }
-      wrong.push_back(changed);
-    }
-    Mapper mapper(live());
-    play(mapper, wrong);
-    const SessionStatus status = mapper.status();
-    expectSumsAgree(status);
-    EXPECT_GT(events, 1U);
-    EXPECT_GT(poses, 1U);
-    EXPECT_EQ(status.live->cameras.at(0).fates[EventFate::kRefused] +
-                  status.live->cameras.at(1).fates[EventFate::kRefused],
-              events);
-    EXPECT_EQ(status.live->refused_poses, poses);
-    EXPECT_EQ(status.live->clock_steps, 0U);
-    EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
-    expectSameMap(*mapper.snapshot(), *expected);
   }
 }
 
