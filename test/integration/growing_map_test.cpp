@@ -183,21 +183,5 @@ TEST_F(GrowingMap, NeedsADisplayForAWindow) {
   EXPECT_FALSE(exists(folder() / "out")) << "before the mapping";
 }
 
-TEST_F(GrowingMap, RefusesFoldersThatItMustNotTouch) {
-  write(SyntheticRecording());
-  write("photos/photo.png", "mine");
-  write("file", "no folder");
-  for (const auto& [folder, why] : std::vector<std::pair<std::string, std::string>>{
-           {"photos", "photos: holds other files than frames"},
-           {"data", "data: it is the input"},
-           {"file", "file"}}) {
-    const Result result = run("map rig.ini data --out out --record-frames " + folder);
-    EXPECT_EQ(result.status, 1) << folder;
-    EXPECT_THAT(result.err, HasSubstr(why));
-    EXPECT_FALSE(exists(this->folder() / "out")) << "before the mapping";
-  }
-  EXPECT_EQ(contentOf("photos/photo.png"), "mine");
-}
-
 }  // namespace
 }  // namespace efm

@@ -3,8 +3,6 @@
 // only one peak.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <random>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_mapper.h"
+#include "test/mapping/keyframes/random_scene.h"
 
 namespace efm {
 namespace {
@@ -50,19 +49,6 @@ std::vector<Event> eventsEverywhere(std::size_t count, std::uint32_t seed) {
   return events;
 }
 
-/// A quick hand-held motion, so that there are many pose packets.
-Trajectory shakyMotion() {
-  Trajectory trajectory;
-  for (std::int64_t t_ns = 0; t_ns <= kWindow_ns; t_ns += 2'000'000) {
-    const double t_s = 1e-9 * static_cast<double>(t_ns);
-    StampedPose pose{t_ns, {}};
-    pose.T_world_rig.translation = {0.5 * t_s, 0.05 * std::sin(20 * t_s), 0};
-    pose.T_world_rig.rotation = Eigen::AngleAxisd(0.8 * t_s, Eigen::Vector3d::UnitY());
-    trajectory.add(pose);
-  }
-  return trajectory;
-}
-
 double megabytesAbove(double before_bytes) {
   return (memoryBytes("VmHWM") - before_bytes) / kMegabyte;
 }
@@ -71,7 +57,8 @@ double megabytesAbove(double before_bytes) {
 TEST(KeyframeMemory, OfAStereoPairAtHdHasBoundsAboveTheEventsWhateverTheSubintervals) {
   const std::vector<std::vector<Event>> events = {eventsEverywhere(2'000'000, 1),
                                                   eventsEverywhere(2'000'000, 2)};
-  const Trajectory trajectory = shakyMotion();
+  // Quick and hand-held, so that there are many pose packets.
+  const Trajectory trajectory = test::RandomScene(1).motion(0, 1e-9 * kWindow_ns, 2, 2);
   const double before = memoryBytes("VmRSS");
   const auto map = [&](ExtractionMethod method, int subintervals) {
     KeyframeMapperOptions options;

@@ -60,6 +60,20 @@ std::string calibrationOfKalibr() {
       fx, fy, cx, cy, k1, k2, p1, p2);
 }
 
+TEST_F(OwnRecording, TheOriginalIsReadCompletely) {
+  if (!fs::exists(kSlider)) GTEST_SKIP() << "no recording in " << kSlider;
+  const Result import = run("import '" + kSlider.string() + "' --out s.rawlog");
+  EXPECT_EQ(import.status, 0) << import.err;
+  EXPECT_THAT(import.out, testing::AllOf(testing::HasSubstr("cam0: 50000 events"),
+                                         testing::HasSubstr("339 poses")));
+  const Result info = run("info s.rawlog");
+  EXPECT_THAT(
+      info.out,
+      testing::AllOf(testing::HasSubstr("cam0: 240x180 pixels"),
+                     testing::HasSubstr("50000 events from 0.003811000 s to 0.174156000 s")));
+  EXPECT_THAT(info.err, testing::IsEmpty()) << "a sound recording";
+}
+
 TEST_F(OwnRecording, OfOtherColumnsClockAndUnitsGivesTheSameMap) {
   if (!fs::exists(kSlider)) GTEST_SKIP() << "no recording in " << kSlider;
   write("events.csv", eventsAsCsv());

@@ -23,13 +23,7 @@ namespace efm {
 class AppTest : public ProgramTest {
  protected:
   Result run(const std::string& arguments) const override {
-    std::cout.flush();
-    std::fflush(nullptr);
-    const pid_t child = fork();
-    if (child == 0) _exit(runHere(arguments));
-    int status = -1;
-    EXPECT_EQ(waitpid(child, &status, 0), child);
-    return resultOf(status);
+    return interrupted(arguments, [] { return false; });
   }
 
   /// Runs event-fusion and sends it a signal as soon as `ready` holds, unless it ends before.

@@ -64,6 +64,21 @@ TEST(ErrorWords, HaveNothingThatALibraryAddsForItsProgrammers) {
 
 }  // namespace
 
+using ProgramOutput = AppTest;
+
+TEST_F(ProgramOutput, ThatCannotBeWrittenIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  writeDataset(SyntheticRecording(0.1), folder() / "data");
+  for (const char* arguments : {"info data", "import data --out s.rawlog", "--help", "--version"}) {
+    const Result result =
+        shell("{ '" EFM_EVENT_FUSION "' " + std::string(arguments) + " >/dev/full; }");
+    EXPECT_NE(result.status, 0) << arguments;
+    EXPECT_THAT(result.err,
+                testing::StartsWith("event-fusion: error: the output cannot be written"))
+        << arguments;
+  }
+}
+
 // What a signal leaves. `map` is stopped at any time in test/integration/interruption_test.cpp.
 
 namespace {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `event-fusion simulate` on a trajectory with a calibration, as a user runs it.
-#include <algorithm>
 #include <cstdlib>
 
 #include "mapping/geometry/rig.h"
@@ -56,33 +55,6 @@ TEST_F(SimulateCommand, WritesTheGivenRig) {
     EXPECT_GT(contentOf("sim/cam" + std::to_string(i) + "/events.txt").size(), 0U);
   }
   EXPECT_THAT(contentOf("sim/depth/index.txt"), HasSubstr("0.200000000"));
-}
-
-TEST_F(SimulateCommand, NoiseHasItsRate) {
-  writeRigAndTrajectory();
-  simulate(
-      "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.1 --threshold-on 5 "
-      "--threshold-off 5 --hot-hz 500 --hot-pixels 0.1 --out sim");
-  const std::string events = contentOf("sim/cam0/events.txt");
-  const auto lines = static_cast<double>(std::count(events.begin(), events.end(), '\n'));
-  const double expected = 64 * 48 * 0.1 * 500 * 0.1;
-  // Hot pixels are drawn (their number's deviation is 17 of 307), and each fires 50 times.
-  EXPECT_NEAR(lines, expected, 0.25 * expected);
-}
-
-TEST_F(SimulateCommand, SimulatesRealRigsOnRealTrajectories) {
-  const std::filesystem::path shared = EFM_SHARED_DATA;
-  if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";
-  const std::string trajectories = (shared / "trajectories").string();
-  const std::string calibrations = (shared / "calibration").string();
-  simulate("--scene room --trajectory '" + trajectories +
-           "/mvsec_indoor_flying1.txt' --calibration '" + calibrations +
-           "/mvsec/camchain.yaml' --duration 0.02 --out mvsec");
-  const Rig given = readCamchain(shared / "calibration/mvsec/camchain.yaml");
-  const Rig written = readCamchain(folder() / "mvsec/camchain.yaml");
-  ASSERT_EQ(written.cameras.size(), 2U);
-  EXPECT_EQ(written.cameras[1].model, given.cameras[1].model);
-  EXPECT_GT(contentOf("mvsec/cam1/events.txt").size(), 1000U);
 }
 
 }  // namespace
