@@ -443,5 +443,13 @@ TEST_F(CalibratedSession, InLiveOperationADeclaredCameraMayBeginAtAnyTime) {
   EXPECT_EQ(MappingSession(options).status().rig.cameras.size(), 0U);
 }
 
+TEST_F(CalibratedSession, AnotherNumberOfCamerasIsAnError) {
+  const SyntheticRecording recording;
+  for (const auto& [count, error] : {std::pair{3, "3 cameras: expected 2"}, {1, "1 camera, but"}}) {
+    MappingSession session(optionsOf(SyntheticRecording(0.1, count).cameras));
+    EXPECT_THAT(messageOf([&] { mapAll(session, recording); }), HasSubstr(error));
+  }
+}
+
 }  // namespace
 }  // namespace efm
