@@ -10,6 +10,12 @@
 namespace efm {
 namespace {
 
+/// A time interval [begin, end).
+struct TimeGap {
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
+};
+
 std::vector<StampedPose> withoutLost(const std::vector<StampedPose>& poses,
                                      const PoseDropoutOptions& options) {
   RandomNumbers single(options.seed, 0);
@@ -25,9 +31,6 @@ std::vector<StampedPose> withoutLost(const std::vector<StampedPose>& poses,
   for (const StampedPose& pose : poses) {
     // Drawn for every pose, lost or not: a gap does not change the loss of other poses.
     bool lost = single.uniform() < options.drop_probability;
-    for (const TimeGap& gap : options.gaps) {
-      lost |= pose.t_ns >= gap.begin_ns && pose.t_ns < gap.end_ns;
-    }
     if (options.random_gaps_hz > 0) {
       if (!random_gap) random_gap = gap_after(pose.t_ns);
       while (pose.t_ns >= random_gap->end_ns) random_gap = gap_after(random_gap->end_ns);
@@ -189,9 +192,6 @@ void TrackerFaults::validate() const {
   TrajectoryOptions{perturbation.max_pose_gap_s}.validate();
   const std::int64_t tick_ns = perturbation.tick_ns;
   requireOption(tick_ns >= 1 && tick_ns < 1'000'000, "tick_ns", tick_ns, "1 to 999999");
-  for (const TimeGap& gap : dropouts.gaps) {
-    requireOption(gap.begin_ns < gap.end_ns, "end of a gap", gap.end_ns, "after its begin");
-  }
 }
 
 std::vector<StampedPose> withFaults(const std::vector<StampedPose>& poses,

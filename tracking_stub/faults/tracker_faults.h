@@ -58,21 +58,12 @@ struct PosePerturbationOptions {
   bool any() const { return noise_m > 0 || noise_rad > 0 || keyframe.any() || drift.any(); }
 };
 
-/// A time interval [begin, end).
-struct TimeGap {
-  std::int64_t begin_ns = 0;
-  std::int64_t end_ns = 0;
-};
-
 /// Poses that a tracker loses. The default is none.
 struct PoseDropoutOptions {
   double drop_probability = 0;  ///< Of each pose.
-  std::vector<TimeGap> gaps;    ///< All poses in these are lost. In any order.
   double random_gaps_hz = 0;    ///< Random gaps per second of tracking.
   double random_gap_s = 0.5;    ///< Length of a random gap.
   std::uint64_t seed = 0;
-
-  bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
 };
 
 /// All faults of a tracker. The default is none.
@@ -81,8 +72,11 @@ struct TrackerFaults {
   PoseDropoutOptions dropouts;
   std::int64_t latency_ns = 0;  ///< Between a pose's stamp and its arrival.
 
-  bool any() const { return perturbation.any() || dropouts.any() || latency_ns > 0; }
-  /// The keys and values of `--perturb`: metres, degrees and seconds. Not `gaps` and `tick_ns`.
+  bool any() const {
+    return perturbation.any() || dropouts.drop_probability > 0 || dropouts.random_gaps_hz > 0 ||
+           latency_ns > 0;
+  }
+  /// The keys and values of `--perturb`: metres, degrees and seconds. Not `tick_ns`.
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
     const Allowed metres = Allowed::from(0, 1000, "a number, 0 to 1000 (metres)");
