@@ -25,12 +25,19 @@ template <typename... Values>
   throw std::invalid_argument(fmt::format(format, std::forward<Values>(values)...));
 }
 
-std::string bracketed(std::string_view section) { return "[" + std::string(section) + "]"; }
+/// What an error says of the known sections.
+std::string expectedSection(std::string_view section) {
+  std::vector<std::string> sections;
+  for (const NamedOption& option : listOptions({})) {
+    const std::string name = fmt::format("[{}]", option.section);
+    if (sections.empty() || sections.back() != name) sections.push_back(name);
+  }
+  return expectedName(fmt::format("[{}]", section), sections);
+}
 
 void requireSection(std::string_view origin, std::string_view section) {
   if (isOptionSection(section)) return;
-  refuse("{}: unknown section [{}]: {}", origin, printable(section),
-         expectedName(bracketed(section), optionSections()));
+  refuse("{}: unknown section [{}]: {}", origin, printable(section), expectedSection(section));
 }
 
 /// The origin of what the command line sets.
@@ -42,20 +49,35 @@ std::string keyText(const OptionOrigin& origin, std::string_view section, std::s
                              : fmt::format("{} {}", origin.name, printable(key));
 }
 
-/// What an error says of an unknown key.
+/// What an error says of an unknown key. An earlier version may have had it: the error says the new
+/// name, or that the key is gone.
 std::string unknownKey(std::string_view section, std::string_view key) {
+  static constexpr struct {
+    std::string_view section;
+    std::string_view key;
+    const char* error;
+  } kFormerKeys[] = {
+      {"fusion", "revote", "was removed with re-voting"},
+      {"fusion", "revote_power", "was removed with re-voting"},
+      {"keyframes", "min_visible_share", "is called min_visible_fraction now"},
+      {"depth", "min_excess", "is called min_local_contrast now"},
+  };
+  for (const auto& former : kFormerKeys) {
+    if (former.section == section && former.key == key) return former.error;
+  }
+  std::vector<std::string> keys;
   for (const NamedOption& option : listOptions({})) {
     if (option.key == key) return fmt::format("unknown key: it is one of [{}]", option.section);
+    if (option.section == section) keys.emplace_back(option.key);
   }
-  return "unknown key: " + expectedName(key, optionKeysOf(section));
+  return "unknown key: " + expectedName(key, keys);
 }
 
 bool startsComment(std::string_view text) {
   return text.substr(0, 1) == ";" || text.substr(0, 1) == "#" || text.substr(0, 2) == "//";
 }
 
-}  // namespace
-
+/// A line, or a value, up to a comment.
 std::string_view withoutComment(std::string_view line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const bool after_blank = i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t';
@@ -63,6 +85,8 @@ std::string_view withoutComment(std::string_view line) {
   }
   return line;
 }
+
+}  // namespace
 
 void OptionReader::readFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -72,14 +96,10 @@ void OptionReader::readFile(const std::filesystem::path& path) {
       std::filesystem::is_directory(path)) {
     throw std::runtime_error("cannot read the option file " + path.string());
   }
-  readLines(text.str(), {path.string(), path.parent_path()});
+  readText(text.str(), {path.string(), path.parent_path()});
 }
 
-void OptionReader::readText(std::string_view text, const std::string& name) {
-  readLines(text, {name, {}});
-}
-
-void OptionReader::readLines(std::string_view text, const OptionOrigin& file) {
+void OptionReader::readText(std::string_view text, const OptionOrigin& file) {
   text = withoutByteOrderMark(text);
   std::map<OptionId, int> lines;  // of this text
   std::string section;
@@ -124,8 +144,7 @@ void OptionReader::set(std::string_view assignment) {
 void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
                        const OptionOrigin& origin) {
   if (!isOptionSection(section)) {
-    refuse("{} unknown section: {}", origin.name,
-           expectedName(bracketed(section), optionSections()));
+    refuse("{} unknown section: {}", origin.name, expectedSection(section));
   }
   assign(section, key, trimmed(withoutComment(value)), origin);
 }
@@ -140,11 +159,7 @@ void OptionReader::assign(std::string_view section, std::string_view key, std::s
   } catch (const std::invalid_argument& error) {
     refuse("{}: {}", text, error.what());
   }
-  if (!known) {
-    const std::string_view former = formerOptionError(section, key);
-    refuse("{}: {}", keyText(origin, section, key),
-           former.empty() ? unknownKey(section, key) : std::string(former));
-  }
+  if (!known) refuse("{}: {}", keyText(origin, section, key), unknownKey(section, key));
   given_[{std::string(section), std::string(key)}] = {text, ++assignments_};
 }
 

@@ -13,10 +13,6 @@
 
 namespace efm {
 
-/// A line, or a value, up to a comment: it begins with ';', '#' or "//", at the start or after a
-/// blank.
-std::string_view withoutComment(std::string_view line);
-
 /// The origin of options: a file.
 struct OptionOrigin {
   std::string name;              ///< Errors begin with it: "host.ini, section mapper_dsi:".
@@ -38,8 +34,8 @@ class OptionReader {
   /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
   /// section or key, a key given twice, or a value of the wrong kind.
   void readFile(const std::filesystem::path& path);
-  /// Reads text as `readFile` does; errors call it `name`.
-  void readText(std::string_view text, const std::string& name);
+  /// Reads text as `readFile` does.
+  void readText(std::string_view text, const OptionOrigin& file);
   /// Overrides one option: "section.key=value". The last one counts.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view assignment);
@@ -64,10 +60,8 @@ class OptionReader {
   std::optional<std::string> wrongOption(const OptionError& error) const;
 
  private:
-  void readLines(std::string_view text, const OptionOrigin& file);
   void assign(std::string_view section, std::string_view key, std::string_view value,
               const OptionOrigin& origin);
-
   [[noreturn]] void refuseOutOfRange(const OptionError& error) const;
 
   struct Given {

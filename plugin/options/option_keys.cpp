@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <tuple>
@@ -211,42 +210,10 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
   return list;
 }
 
-std::string_view formerOptionError(std::string_view section, std::string_view key) {
-  struct FormerKey {
-    std::string_view section;
-    std::string_view key;
-    std::string_view error;
-  };
-  static constexpr FormerKey kFormerKeys[] = {
-      {"fusion", "revote", "was removed with re-voting"},
-      {"fusion", "revote_power", "was removed with re-voting"},
-      {"keyframes", "min_visible_share", "is called min_visible_fraction now"},
-      {"depth", "min_excess", "is called min_local_contrast now"},
-  };
-  for (const FormerKey& former : kFormerKeys) {
-    if (former.section == section && former.key == key) return former.error;
-  }
-  return {};
+bool isOptionSection(std::string_view section) {
+  const std::vector<NamedOption> all = listOptions({});
+  return std::any_of(all.begin(), all.end(),
+                     [&](const NamedOption& option) { return option.section == section; });
 }
-
-std::vector<std::string> optionKeysOf(std::string_view section) {
-  std::vector<std::string> keys;
-  for (const NamedOption& entry : listOptions({})) {
-    if (entry.section == section) keys.emplace_back(entry.key);
-  }
-  return keys;
-}
-
-std::vector<std::string> optionSections() {
-  std::vector<std::string> sections;
-  std::string_view last;
-  for (const NamedOption& entry : listOptions({})) {
-    if (entry.section != last) sections.push_back("[" + std::string(entry.section) + "]");
-    last = entry.section;
-  }
-  return sections;
-}
-
-bool isOptionSection(std::string_view section) { return !optionKeysOf(section).empty(); }
 
 }  // namespace efm

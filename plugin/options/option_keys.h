@@ -113,13 +113,4 @@ bool setOption(EventFusionOptions& options, std::string_view section, std::strin
 /// Whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 
-/// The error for a key that an earlier version had: its new name, or that it is gone. Empty for
-/// other keys.
-std::string_view formerOptionError(std::string_view section, std::string_view key);
-
-/// The keys of a section; none of an unknown one.
-std::vector<std::string> optionKeysOf(std::string_view section);
-/// All sections: "[rig]", …
-std::vector<std::string> optionSections();
-
 }  // namespace efm

@@ -26,7 +26,7 @@ const std::filesystem::path kConfigFolder = EFM_SOURCE_DIR "/config";
 
 EventFusionOptions optionsOf(std::string_view text) {
   OptionReader reader;
-  reader.readText(text, "rig.ini");
+  reader.readText(text, {"rig.ini", {}});
   return reader.options();
 }
 
@@ -271,7 +271,7 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
   const auto error = [](const std::string& text, const std::vector<std::string>& sets) {
     return messageOf([&] {
       OptionReader reader;
-      reader.readText(text, "rig.ini");
+      reader.readText(text, {"rig.ini", {}});
       for (const std::string& assignment : sets) reader.set(assignment);
       reader.options();
     });
@@ -331,7 +331,7 @@ TEST(OptionReader, OneOfTwoLimitsMayBeChosenFromTheData) {
 
 TEST(OptionReader, AnErrorOfARecordingSaysHowItsOptionsWereGiven) {
   OptionReader reader;
-  reader.readText("[rig]\ncameras = 0,5\n", "rig.ini");
+  reader.readText("[rig]\ncameras = 0,5\n", {"rig.ini", {}});
   reader.set("dsi.reference_camera=2");
   EXPECT_EQ(reader.wrongOption({{"rig", "cameras", " (how many)"}, "5", "a camera"}),
             "rig.ini:2: [rig] cameras = 0,5: cameras (how many) = 5: must be a camera");
