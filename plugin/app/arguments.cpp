@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "mapping/base/named_choice.h"
@@ -69,13 +70,62 @@ std::string extraText(const CLI::App& command, const std::string& path, const st
   return fmt::format("{}: unknown command: {}", inQuotes(word), expectedName(word, commands));
 }
 
+void setFaults(const std::vector<std::string>& assignments, TrackerFaults& faults) {
+  try {
+    for (const std::string& assignment : assignments) setTrackerFault(assignment, faults);
+  } catch (const std::invalid_argument& error) {
+    throw CLI::ValidationError("--perturb", error.what());
+  }
+}
+
+/// The option files that come with the program, for the end of a help text.
+std::string configList() {
+  const std::string list = fmt::format("{}", fmt::join(configNames(), ", "));
+  return list.empty() ? "" : "Option files that come with the program: " + list;
+}
+
+/// An option file before the sources is taken like --config.
+void takeConfig(MappingArguments& arguments) {
+  auto& files = arguments.source.files;
+  if (files.front().extension() != ".ini") return;
+  if (!arguments.config.empty()) {
+    throw CLI::ValidationError("--config", "a second option file: " + files.front().string());
+  }
+  arguments.config = files.front().string();
+  files.erase(files.begin());
+  if (files.empty()) throw CLI::RequiredError("SOURCE");
+}
+
+void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
+  addSource(command, arguments.source);
+  command
+      .add_option(
+          "--config", arguments.config,
+          "The option file: a name of those listed below, or a file; `default` has all keys")
+      ->type_name("NAME|FILE");
+  command
+      .add_option("-o,--out", arguments.out,
+                  "Folder for the results; an earlier result is replaced (default: named after the "
+                  "recording, in the working folder)")
+      ->type_name("DIR");
+  command.add_flag("--force", arguments.force, "Write into a folder that holds other files");
+  command
+      .add_option("--set", arguments.sets,
+                  "Overrides one option, e.g. --set dsi.num_planes=200; may be repeated")
+      ->type_name("SECTION.KEY=VALUE")
+      ->allow_extra_args(false);
+  command.add_flag("--plain-pictures", arguments.plain_pictures,
+                   "Write depth.png and confidence.png in the sensor's size, without colour bar");
+  addStrict(command, arguments.strict);
+  addVerbosity(command, arguments.verbosity, true);
+  command.footer(configList);
+}
+
 }  // namespace
 
 CLI::Validator oneOf(const std::vector<std::string>& names) {
   return {[names](std::string& text) {
-            for (const std::string& name : names) {
-              if (name == text) return std::string();
-            }
+            if (std::count(names.begin(), names.end(), text) > 0) return std::string();
             return inQuotes(text) + ": " + expectedName(text, names);
           },
           fmt::format("{{{}}}", fmt::join(names, ","))};
@@ -113,18 +163,6 @@ std::string errorText(const CLI::App& app, const CLI::ParseError& error) {
   }
   return wrong_value ? text : text + "; see " + path + " --help";
 }
-
-namespace {
-
-void setFaults(const std::vector<std::string>& assignments, TrackerFaults& faults) {
-  try {
-    for (const std::string& assignment : assignments) setTrackerFault(assignment, faults);
-  } catch (const std::invalid_argument& error) {
-    throw CLI::ValidationError("--perturb", error.what());
-  }
-}
-
-}  // namespace
 
 void addSource(CLI::App& command, RecordingSource& source) {
   command
@@ -251,61 +289,14 @@ std::int64_t nanosecondsOf(const std::string& text, const std::string& name) {
   return *parsed;
 }
 
-void requireKeyframeLengthOf(const TrackerFaults& faults) {
-  try {
-    requireKeyframeLength(faults);
-  } catch (const std::invalid_argument& error) {
-    throw CLI::ValidationError("--perturb", error.what());
-  }
+void requireKeyframeLength(const TrackerFaults& faults) {
+  const KeyframeNoiseOptions& keyframe = faults.perturbation.keyframe;
+  if (!keyframe.any() || keyframe.length_ns) return;
+  throw CLI::ValidationError(
+      "--perturb",
+      "keyframe_s: must be given with keyframe_noise_m and keyframe_noise_deg, 0.001 to 1e6 "
+      "(seconds)");
 }
-
-namespace {
-
-/// The option files that come with the program, for the end of a help text.
-std::string configList() {
-  std::string list;
-  for (const std::string& name : configNames()) list += (list.empty() ? "" : ", ") + name;
-  return list.empty() ? "" : "Option files that come with the program: " + list;
-}
-
-/// An option file before the sources is taken like --config.
-void takeConfig(MappingArguments& arguments) {
-  auto& files = arguments.source.files;
-  if (files.front().extension() != ".ini") return;
-  if (!arguments.config.empty()) {
-    throw CLI::ValidationError("--config", "a second option file: " + files.front().string());
-  }
-  arguments.config = files.front().string();
-  files.erase(files.begin());
-  if (files.empty()) throw CLI::RequiredError("SOURCE");
-}
-
-void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
-  addSource(command, arguments.source);
-  command
-      .add_option(
-          "--config", arguments.config,
-          "The option file: a name of those listed below, or a file; `default` has all keys")
-      ->type_name("NAME|FILE");
-  command
-      .add_option("-o,--out", arguments.out,
-                  "Folder for the results; an earlier result is replaced (default: named after the "
-                  "recording, in the working folder)")
-      ->type_name("DIR");
-  command.add_flag("--force", arguments.force, "Write into a folder that holds other files");
-  command
-      .add_option("--set", arguments.sets,
-                  "Overrides one option, e.g. --set dsi.num_planes=200; may be repeated")
-      ->type_name("SECTION.KEY=VALUE")
-      ->allow_extra_args(false);
-  command.add_flag("--plain-pictures", arguments.plain_pictures,
-                   "Write depth.png and confidence.png in the sensor's size, without colour bar");
-  addStrict(command, arguments.strict);
-  addVerbosity(command, arguments.verbosity, true);
-  command.footer(configList);
-}
-
-}  // namespace
 
 void addMap(CLI::App& app, Run& run) {
   CLI::App& command = *app.add_subcommand(

@@ -63,8 +63,8 @@ void addStrict(CLI::App& command, bool& strict);
 std::int64_t nanosecondsOf(const std::string& text, const std::string& name);
 
 /// For a command without an option file, which has the length of a keyframe.
-/// @throws CLI::ValidationError as `requireKeyframeLength` does.
-void requireKeyframeLengthOf(const TrackerFaults& faults);
+/// @throws CLI::ValidationError if there is noise per keyframe, but no length of a keyframe.
+void requireKeyframeLength(const TrackerFaults& faults);
 
 void addMap(CLI::App& app, Run& run);
 void addDepth(CLI::App& app, Run& run);

@@ -12,23 +12,6 @@
 namespace efm {
 namespace {
 
-/// For commands that write a rawlog.
-void addPacketLength(CLI::App& command, std::int64_t& packet_ns) {
-  command
-      .add_option_function<std::string>(
-          "--packet-s",
-          [&packet_ns](const std::string& text) {
-            const std::optional<std::int64_t> length_ns = parseSeconds(text);
-            if (!length_ns || *length_ns < 1'000 || *length_ns > kNanosecondsPerSecond) {
-              throw CLI::ValidationError("--packet-s",
-                                         inQuotes(text) + ": expected 0.000001 to 1 seconds");
-            }
-            packet_ns = *length_ns;
-          },
-          "Length of a packet of events (default 0.01)")
-      ->type_name("SECONDS");
-}
-
 void addImport(CLI::App& app, Run& run) {
   CLI::App& command =
       *app.add_subcommand("import", "Turn a recording into a rawlog, MRPT's format");
@@ -50,10 +33,21 @@ void addImport(CLI::App& app, Run& run) {
           "faster to write and to read. none")
       ->check(oneOf({"gzip", "zstd", "none"}))
       ->type_name("");
-  addPacketLength(command, arguments->source.packet_ns);
+  command
+      .add_option_function<std::string>(
+          "--packet-s",
+          [arguments](const std::string& text) {
+            const std::optional<std::int64_t> length_ns = parseSeconds(text);
+            if (!length_ns || *length_ns < 1'000 || *length_ns > kNanosecondsPerSecond) {
+              throw CLI::ValidationError("--packet-s",
+                                         inQuotes(text) + ": expected 0.000001 to 1 seconds");
+            }
+            arguments->source.packet_ns = *length_ns;
+          },
+          "Length of a packet of events (default 0.01)")
+      ->type_name("SECONDS");
   addVerbosity(command, arguments->verbosity);
-  command.parse_complete_callback(
-      [arguments] { requireKeyframeLengthOf(arguments->source.faults); });
+  command.parse_complete_callback([arguments] { requireKeyframeLength(arguments->source.faults); });
 }
 
 void addExport(CLI::App& app, Run& run) {
@@ -69,8 +63,7 @@ void addExport(CLI::App& app, Run& run) {
       ->type_name("PATH");
   addTimeLimits(command, arguments->times);
   addVerbosity(command, arguments->verbosity);
-  command.parse_complete_callback(
-      [arguments] { requireKeyframeLengthOf(arguments->source.faults); });
+  command.parse_complete_callback([arguments] { requireKeyframeLength(arguments->source.faults); });
 }
 
 void addInfo(CLI::App& app, Run& run) {
@@ -87,7 +80,7 @@ void addInfo(CLI::App& app, Run& run) {
   command.get_option("SOURCE")->required(false);
   command.parse_complete_callback([arguments] {
     if (!arguments->system && arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");
-    requireKeyframeLengthOf(arguments->source.faults);
+    requireKeyframeLength(arguments->source.faults);
   });
 }
 

@@ -19,6 +19,8 @@
 
 namespace efm {
 
+// Each run… function returns the process's exit status.
+
 struct InfoArguments {
   RecordingSource source;
   TimeArguments times;
@@ -29,7 +31,6 @@ struct InfoArguments {
 
 /// `event-fusion info`: prints the contents of a recording; if quiet, only what is wrong with
 /// it.
-/// @return the process's exit status.
 /// @throws std::exception if the recording cannot be read to its end. The contents before the error
 /// have been printed.
 int runInfo(const InfoArguments& arguments);
@@ -37,10 +38,6 @@ int runInfo(const InfoArguments& arguments);
 /// Linux's "model name", or else the name of the board, which Arm processors have instead;
 /// "unknown" where there is neither.
 std::string processorName();
-
-/// Prints the processor, its cores and caches, the kernels that it can run and the one that is
-/// chosen.
-void printSystem();
 
 struct ImportArguments {
   RecordingSource source;
@@ -52,12 +49,10 @@ struct ImportArguments {
 
 /// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other
 /// file.
-/// @return the process's exit status.
-/// @throws Interrupted if a signal came; then there is no result.
 /// A recording without poses or calibration will do. Of a damaged one, what came before the damage
 /// is written, and the status is 1.
-/// @throws std::exception if no event can be read or the rawlog cannot be written. Then there is no
-/// rawlog.
+/// @throws Interrupted if a signal came; std::exception if no event can be read or the rawlog
+/// cannot be written. Then there is no rawlog.
 int runImport(const ImportArguments& arguments);
 
 struct ExportArguments {
@@ -72,13 +67,8 @@ struct ExportArguments {
 std::vector<std::string> exportFormats();
 
 /// `event-fusion export`: writes a recording for other tools. Stamps have the cameras' time offsets
-/// added; poses are those of camera 0, T_world_cam0.
-/// @return the process's exit status.
-/// @throws Interrupted if a signal came; then there is no result.
-/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
-/// is written, and the status is 1.
-/// @throws std::exception if no event can be read or the result cannot be written. Then there is no
-/// result.
+/// added; poses are those of camera 0, T_world_cam0. Incomplete recordings and errors: as in
+/// runImport.
 int runExport(const ExportArguments& arguments);
 
 struct ViewArguments {
@@ -88,7 +78,6 @@ struct ViewArguments {
 /// `event-fusion view`: opens map.html with the program that the system has for pages (`xdg-open`,
 /// `open`), and prints its path. Where there is no screen or no such program, stderr says so; that
 /// is no error: the page is there for any browser.
-/// @return the process's exit status.
 int runView(const ViewArguments& arguments);
 
 /// The common arguments of `map` and `depth`.
@@ -151,45 +140,37 @@ struct SimulateArguments {
 
 /// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset
 /// folder.
-/// @return the process's exit status.
 /// @throws Interrupted if a signal came; then there is no result.
 /// @throws std::exception if the arguments are not valid or something cannot be written.
 int runSimulate(const SimulateArguments& arguments);
 
-struct EvaluationOutput {
+/// The common arguments of `evaluate`.
+struct EvaluateArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
   bool json = false;
   std::filesystem::path plot;  ///< Empty: no plot.
 };
 
-struct EvaluateDepthArguments {
-  std::filesystem::path estimate;
-  std::filesystem::path truth;
+struct EvaluateDepthArguments : EvaluateArguments {
   std::optional<double> focal_px;
   std::optional<double> baseline_m;
   DepthEvaluationOptions options;
-  EvaluationOutput output;
 };
 
-struct EvaluateMapArguments {
-  std::filesystem::path estimate;
-  std::filesystem::path truth;
+struct EvaluateMapArguments : EvaluateArguments {
   CloudEvaluationOptions options;
-  EvaluationOutput output;
 };
 
-struct EvaluateTrajectoryArguments {
-  std::filesystem::path estimate;
-  std::filesystem::path truth;
+struct EvaluateTrajectoryArguments : EvaluateArguments {
   std::string alignment = "se3";  ///< se3, origin or none.
   std::vector<double> lengths_m;
   std::vector<double> deltas_s;
   std::vector<double> frames;
   TrajectoryEvaluationOptions options;
-  EvaluationOutput output;
 };
 
 /// `event-fusion evaluate …`: prints the errors of results and draws them if asked for.
-/// @return the process's exit status.
 /// @throws std::exception if something cannot be compared or written.
 int runEvaluateDepth(const EvaluateDepthArguments& arguments);
 int runEvaluateMap(const EvaluateMapArguments& arguments);

@@ -34,66 +34,27 @@ std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& argum
   return stereo;
 }
 
-/// @param inputs files, or folders whose files are read.
-void refusePlotOver(const EvaluationOutput& output,
-                    const std::vector<std::filesystem::path>& inputs) {
-  if (output.plot.empty()) return;
-  refuseToReplace(output.plot, inputs);
-  refuseFileIn(inputs, output.plot);
+/// @param third an input beside the estimate and the truth; may be empty. Each may be a folder
+/// whose files are read.
+void refusePlotOver(const EvaluateArguments& arguments, const std::filesystem::path& third = {}) {
+  if (arguments.plot.empty()) return;
+  const std::vector<std::filesystem::path> inputs = {arguments.estimate, arguments.truth, third};
+  refuseToReplace(arguments.plot, inputs);
+  refuseFileIn(inputs, arguments.plot);
 }
 
 /// Writes the plot, if asked for, and prints the errors.
 template <typename Plot>
-int finish(const EvaluationOutput& output, const std::string& table, const std::string& json,
+int finish(const EvaluateArguments& arguments, const std::string& table, const std::string& json,
            Plot plot) {
-  if (!output.plot.empty()) writePicture(output.plot, plot());
-  std::cout << (output.json ? json : table);
+  if (!arguments.plot.empty()) writePicture(arguments.plot, plot());
+  std::cout << (arguments.json ? json : table);
   return 0;
 }
 
-}  // namespace
-
-int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
-  refusePlotOver(arguments.output, {arguments.estimate, arguments.truth, arguments.options.mask});
-  const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
-  DepthEvaluationOptions options = arguments.options;
-  if (stereo) options.focal_baseline = stereo->focalBaseline();
-  const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
-  return finish(arguments.output, evaluationTable(evaluation, stereo),
-                evaluationJson(evaluation, stereo),
-                [&] { return evaluationPlot(evaluation, options); });
-}
-
-int runEvaluateMap(const EvaluateMapArguments& arguments) {
-  refusePlotOver(arguments.output,
-                 {arguments.estimate, arguments.truth, arguments.options.to_find});
-  const CloudEvaluation evaluation =
-      evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
-  return finish(arguments.output, evaluationTable(evaluation), evaluationJson(evaluation),
-                [&] { return evaluationPlot(evaluation); });
-}
-
-int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
-  refusePlotOver(arguments.output, {arguments.estimate, arguments.truth});
-  using Unit = RelativeSpacing::Unit;
-  TrajectoryEvaluationOptions options = arguments.options;
-  options.alignment = valueIn(kTrajectoryAlignments, arguments.alignment);
-  for (const auto& [unit, amounts] : {std::pair{Unit::kFrames, &arguments.frames},
-                                      {Unit::kSeconds, &arguments.deltas_s},
-                                      {Unit::kMetres, &arguments.lengths_m}}) {
-    for (const double amount : *amounts) options.spacings.push_back({unit, amount});
-  }
-  const TrajectoryEvaluation evaluation =
-      evaluateTrajectory(arguments.estimate, arguments.truth, options);
-  return finish(arguments.output, evaluationTable(evaluation), evaluationJson(evaluation),
-                [&] { return evaluationPlot(evaluation); });
-}
-
-namespace {
-
-void addOutput(CLI::App& command, EvaluationOutput& output, const std::string& plotted) {
-  command.add_flag("--json", output.json, "Print JSON instead of a table; the keys are below");
-  command.add_option("--plot", output.plot, "Also draw " + plotted)->type_name("FILE.png");
+void addOutput(CLI::App& command, EvaluateArguments& arguments, const std::string& plotted) {
+  command.add_flag("--json", arguments.json, "Print JSON instead of a table; the keys are below");
+  command.add_option("--plot", arguments.plot, "Also draw " + plotted)->type_name("FILE.png");
 }
 
 /// An option with a list of positive numbers.
@@ -156,7 +117,7 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
           "error is within the threshold), recall (fraction of the true pixels with such an "
           "estimate) and F1")
       ->capture_default_str();
-  addOutput(command, arguments->output,
+  addOutput(command, *arguments,
             "estimate, truth and error side by side, and precision, recall and F1");
   command.footer(depthEvaluationKeys());
 }
@@ -183,7 +144,7 @@ void addEvaluateMap(CLI::App& evaluate, Run& run) {
   addList(command, "--distances", arguments->options.distances_m,
           "Distances in metres for completeness and outliers")
       ->capture_default_str();
-  addOutput(command, arguments->output, "accuracy, completeness and F1 over the distance");
+  addOutput(command, *arguments, "accuracy, completeness and F1 over the distance");
   command.footer(cloudEvaluationKeys());
 }
 
@@ -221,11 +182,45 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
           "--deltas and --frames: over 10 to 50 % of the true length, 1 second and 1 frame");
   addList(command, "--deltas", arguments->deltas_s, "Relative errors over these times in seconds");
   addList(command, "--frames", arguments->frames, "Relative errors over these numbers of pairs");
-  addOutput(command, arguments->output, "both trajectories, and the errors over time");
+  addOutput(command, *arguments, "both trajectories, and the errors over time");
   command.footer(trajectoryEvaluationKeys());
 }
 
 }  // namespace
+
+int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
+  refusePlotOver(arguments, arguments.options.mask);
+  const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
+  DepthEvaluationOptions options = arguments.options;
+  if (stereo) options.focal_baseline = stereo->focalBaseline();
+  const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
+  return finish(arguments, evaluationTable(evaluation, stereo), evaluationJson(evaluation, stereo),
+                [&] { return evaluationPlot(evaluation, options); });
+}
+
+int runEvaluateMap(const EvaluateMapArguments& arguments) {
+  refusePlotOver(arguments, arguments.options.to_find);
+  const CloudEvaluation evaluation =
+      evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
+  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation),
+                [&] { return evaluationPlot(evaluation); });
+}
+
+int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
+  refusePlotOver(arguments);
+  using Unit = RelativeSpacing::Unit;
+  TrajectoryEvaluationOptions options = arguments.options;
+  options.alignment = valueIn(kTrajectoryAlignments, arguments.alignment);
+  for (const auto& [unit, amounts] : {std::pair{Unit::kFrames, &arguments.frames},
+                                      {Unit::kSeconds, &arguments.deltas_s},
+                                      {Unit::kMetres, &arguments.lengths_m}}) {
+    for (const double amount : *amounts) options.spacings.push_back({unit, amount});
+  }
+  const TrajectoryEvaluation evaluation =
+      evaluateTrajectory(arguments.estimate, arguments.truth, options);
+  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation),
+                [&] { return evaluationPlot(evaluation); });
+}
 
 void addEvaluate(CLI::App& app, Run& run) {
   CLI::App& evaluate = *app.add_subcommand("evaluate", "Compare results with the truth");

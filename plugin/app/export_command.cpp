@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,7 +10,6 @@
 #include <string>
 #include <utility>
 
-#include "mapping/geometry/timestamp.h"
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/output_checks.h"
@@ -25,18 +23,9 @@
 #include "plugin/session/session_status.h"
 
 namespace efm {
-namespace {
-
-/// An existing file is replaced only if it is a rawlog, and none of the inputs.
-void refuseToDestroy(const ImportArguments& arguments) {
-  if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
-}
-
-}  // namespace
-
 int runImport(const ImportArguments& arguments) {
   refuseToReplace(arguments.out, inputsOf(arguments.source));
-  refuseToDestroy(arguments);
+  if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
   RecordingSource source = arguments.source;
   source.complete = false;
   source.rounded = false;  // the writer rounds
@@ -78,7 +67,7 @@ int runImport(const ImportArguments& arguments) {
     writer->close();
   }
   printWarnings(missingParts(cameras, all_events > 0, poses > 0));
-  warnOfLosses(recording->counts());
+  printWarnings(lossWarnings(recording->counts()));
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     printWarnings({{"hand-eye-left-out",
                     fmt::format("odometry ({} observations) cannot hold the hand-eye transform: "
@@ -115,74 +104,17 @@ const std::vector<ExportFormat>& formats() {
   return all;
 }
 
-/// Writes samples, and counts them.
-class Export {
- public:
-  /// @param rig of the recording; the results' rig has camera 0's frame.
-  Export(const ExportArguments& arguments, Rig rig)
-      : T_rig_cam0_(rig.cameras[0].T_rig_cam), quiet_(arguments.verbosity == Verbosity::kQuiet) {
-    for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-      cameras_.emplace(static_cast<int>(i), rig.cameras[i].model);
-    }
-    const Rigid3 T_cam0_rig = T_rig_cam0_.inverse();
-    for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-      Rigid3& T = rig.cameras[i].T_rig_cam;
-      T = i == 0 ? Rigid3() : T_cam0_rig * T;
-    }
-    for (const ExportFormat& format : formats()) {
-      if (format.name == arguments.format) writer_ = format.open(arguments.out, rig);
-    }
-    if (!writer_) throw std::runtime_error("'" + arguments.format + "' is not a known format");
+/// The result's rig has camera 0's frame, and no time offsets: these are added to the stamps.
+std::unique_ptr<RecordingWriter> openWriter(const ExportArguments& arguments, Rig rig) {
+  const Rigid3 T_cam0_rig = rig.cameras[0].T_rig_cam.inverse();
+  for (RigCamera& camera : rig.cameras) {
+    camera.T_rig_cam = &camera == &rig.cameras[0] ? Rigid3() : T_cam0_rig * camera.T_rig_cam;
+    camera.time_offset_ns = 0;
   }
-
-  void add(Sample sample) {
-    if (auto* packet = std::get_if<EventPacket>(&sample)) {
-      for (Event& event : packet->events) event.t_ns += packet->calibration.time_offset_ns;
-      writer_->addEvents(static_cast<std::size_t>(packet->camera), packet->events);
-      events_ += packet->events.size();
-    } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
-      if (!pose_source_) pose_source_ = pose->source;
-      if (!(pose->source == *pose_source_)) {
-        ++other_poses_;
-        return;
-      }
-      writer_->addPose({pose->t_ns, rigPose(*pose, {}) * T_rig_cam0_});
-      ++poses_;
-    }
-  }
-
-  std::uint64_t events() const { return events_; }
-
-  void add(const TruthDepth& truth) { writer_->addTruth(truth.t_ns, truth.file); }
-
-  /// @param damage the error that ended the recording. @return the process's exit status.
-  int close(const std::filesystem::path& out, const std::optional<std::string>& damage) {
-    if (events_ == 0 && damage) throw std::runtime_error(*damage);
-    writer_->close();
-    if (!quiet_) fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
-    printWarnings(missingParts(cameras_, events_ > 0, poses_ > 0));
-    if (other_poses_ > 0) {
-      printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
-                                                  other_poses_, asText(*pose_source_))}});
-    }
-    return damage ? failAfter(*damage, events_, poses_, out) : 0;
-  }
-
- private:
-  Rigid3 T_rig_cam0_;
-  bool quiet_;
-  std::map<int, CameraModel> cameras_;
-  std::unique_ptr<RecordingWriter> writer_;
-  std::optional<PoseSourceId> pose_source_;
-  std::uint64_t events_ = 0;
-  std::uint64_t poses_ = 0;
-  std::uint64_t other_poses_ = 0;
-};
-
-/// An empty folder may be there: a writer of folders fills it.
-void refuseExisting(const std::filesystem::path& out) {
-  if (!std::filesystem::is_regular_file(out)) return;
-  throw std::runtime_error(out.string() + ": it exists: expected the name of a new file or folder");
+  const auto format =
+      std::find_if(formats().begin(), formats().end(),
+                   [&](const ExportFormat& known) { return known.name == arguments.format; });
+  return format->open(arguments.out, rig);
 }
 
 }  // namespace
@@ -195,32 +127,61 @@ std::vector<std::string> exportFormats() {
 
 int runExport(const ExportArguments& arguments) {
   refuseToReplace(arguments.out, inputsOf(arguments.source));
-  refuseExisting(arguments.out);
+  if (std::filesystem::is_regular_file(arguments.out)) {  // a writer fills an empty folder
+    throw std::runtime_error(arguments.out.string() +
+                             ": it exists: expected the name of a new file or folder");
+  }
   RecordingSource source = arguments.source;
   source.complete = false;
   source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);
-  Rig rig = recording->rig();
+  const Rig rig = recording->rig();
   if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");
-  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // added to the stamps
   const Interruption interruption;
-  Export result(arguments, rig);
+  const std::unique_ptr<RecordingWriter> writer = openWriter(arguments, rig);
+  std::uint64_t events = 0;
+  std::uint64_t poses = 0;
+  std::uint64_t other_poses = 0;
+  std::optional<PoseSourceId> pose_source;
   std::optional<std::string> damage;
   {
     Progress progress("exporting", arguments.verbosity);
     damage = readAll(*recording, [&](Sample sample) {
       interruption.check();
-      result.add(std::move(sample));
+      if (auto* packet = std::get_if<EventPacket>(&sample)) {
+        for (Event& event : packet->events) event.t_ns += packet->calibration.time_offset_ns;
+        writer->addEvents(static_cast<std::size_t>(packet->camera), packet->events);
+        events += packet->events.size();
+      } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
+        if (!pose_source) pose_source = pose->source;
+        const bool is_used = pose->source == *pose_source;
+        if (is_used) writer->addPose({pose->t_ns, rigPose(*pose, {}) * rig.cameras[0].T_rig_cam});
+        ++(is_used ? poses : other_poses);
+      }
       progress.show(recording->progress());
     });
   }
-  if (!damage && result.events() == 0) refuseLimitsWithoutEvents(source.limits, *recording);
+  if (!damage && events == 0) refuseLimitsWithoutEvents(source.limits, *recording);
   for (const TruthDepth& truth : openTruth(source)) {
     interruption.check();
-    if (source.limits.contain(truth.t_ns)) result.add(truth);
+    if (source.limits.contain(truth.t_ns)) writer->addTruth(truth.t_ns, truth.file);
   }
-  warnOfLosses(recording->counts());
-  return result.close(arguments.out, damage);
+  printWarnings(lossWarnings(recording->counts()));
+  if (events == 0 && damage) throw std::runtime_error(*damage);
+  writer->close();
+  if (arguments.verbosity != Verbosity::kQuiet) {
+    fmt::print("{} events, {} poses; written to {}\n", events, poses, arguments.out.string());
+  }
+  std::map<int, CameraModel> cameras;
+  for (const RigCamera& camera : rig.cameras) {
+    cameras.emplace(static_cast<int>(cameras.size()), camera.model);
+  }
+  printWarnings(missingParts(cameras, events > 0, poses > 0));
+  if (other_poses > 0) {
+    printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
+                                                other_poses, asText(*pose_source))}});
+  }
+  return damage ? failAfter(*damage, events, poses, arguments.out) : 0;
 }
 
 }  // namespace efm

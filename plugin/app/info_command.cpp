@@ -71,14 +71,14 @@ void printRate(const EventRate& rate, std::int64_t first_ns, std::int64_t last_n
 void printCameras(const RecordingStatistics& statistics) {
   const auto span = statistics.eventSpan();
   for (const auto& [key, camera] : statistics.cameras()) {
-    fmt::print("{}: {}\n  ", camera.label, asText(camera.camera.model));
+    fmt::print("{}: {}\n  ", key.second, asText(camera.camera.model));
     printStream(camera.events, "events");
     if (span) printRate(camera.rate, span->first_ns, span->last_ns);
   }
   const auto& cameras = statistics.cameras();
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
-      fmt::print("baseline {} to {}: {:g} m\n", a->second.label, b->second.label,
+      fmt::print("baseline {} to {}: {:g} m\n", a->first.second, b->first.second,
                  baselineOf(a->second.camera, b->second.camera));
     }
   }
@@ -140,6 +140,29 @@ std::vector<Warning> judge(FirstLook& look, bool quiet, Findings& findings) {
   return survey.judgePoses(options).warnings;
 }
 
+/// The sizes of the data caches, as far as the system tells them.
+std::string cacheSizes() {
+  std::string sizes;
+  for (const auto& [name, key] : {std::pair("L1d", _SC_LEVEL1_DCACHE_SIZE),
+                                  {"L2", _SC_LEVEL2_CACHE_SIZE},
+                                  {"L3", _SC_LEVEL3_CACHE_SIZE}}) {
+    const long bytes = sysconf(key);
+    if (bytes <= 0) continue;
+    sizes += fmt::format("{}{} {} KiB", sizes.empty() ? "" : ", ", name, bytes / 1024);
+  }
+  return sizes.empty() ? "unknown" : sizes;
+}
+
+/// The processor, its cores and caches, the kernels that it can run and the one that is chosen.
+void printSystem() {
+  fmt::print("event-fusion {}\nprocessor: {}\ncores: {}\ncaches: {}\n", EFM_VERSION,
+             processorName(), SpaceSweepOptions().threadsOrCores(), cacheSizes());
+  for (const VotingKernel kernel : availableKernels()) {
+    fmt::print("kernel {}{}\n", nameOf(kernel),
+               kernel == fastestKernel() ? ": chosen where [performance] kernel = auto" : "");
+  }
+}
+
 }  // namespace
 
 int runInfo(const InfoArguments& arguments) {
@@ -176,27 +199,10 @@ int runInfo(const InfoArguments& arguments) {
   Findings findings{contents.statistics, recording->counts()};
   std::vector<Warning> warnings;
   if (takes) warnings = judge(look, quiet, findings);
-  for (Warning& warning : warningsOf(findings)) warnings.push_back(std::move(warning));
+  append(warnings, warningsOf(findings));
   printWarnings(warnings);
   return arguments.strict && failStrictly(warnings) ? kFailedStatus : 0;
 }
-
-namespace {
-
-/// The sizes of the data caches, as far as the system tells them.
-std::string cacheSizes() {
-  std::string sizes;
-  for (const auto& [name, key] : {std::pair("L1d", _SC_LEVEL1_DCACHE_SIZE),
-                                  {"L2", _SC_LEVEL2_CACHE_SIZE},
-                                  {"L3", _SC_LEVEL3_CACHE_SIZE}}) {
-    const long bytes = sysconf(key);
-    if (bytes <= 0) continue;
-    sizes += fmt::format("{}{} {} KiB", sizes.empty() ? "" : ", ", name, bytes / 1024);
-  }
-  return sizes.empty() ? "unknown" : sizes;
-}
-
-}  // namespace
 
 std::string processorName() {
   std::ifstream cpuinfo("/proc/cpuinfo");
@@ -209,15 +215,6 @@ std::string processorName() {
   std::string board;
   std::getline(std::ifstream("/sys/firmware/devicetree/base/model"), board, '\0');
   return board.empty() ? "unknown" : board;
-}
-
-void printSystem() {
-  fmt::print("event-fusion {}\nprocessor: {}\ncores: {}\ncaches: {}\n", EFM_VERSION,
-             processorName(), SpaceSweepOptions().threadsOrCores(), cacheSizes());
-  for (const VotingKernel kernel : availableKernels()) {
-    fmt::print("kernel {}{}\n", nameOf(kernel),
-               kernel == fastestKernel() ? ": chosen where [performance] kernel = auto" : "");
-  }
 }
 
 }  // namespace efm

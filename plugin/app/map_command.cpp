@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
-#include <initializer_list>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
@@ -92,13 +91,6 @@ void warnOfNoPoints(MapReport& report) {
       "([map] min_keyframes, outlier_radius_m); or the calibration and the poses do not "
       "explain the events",
       pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths);
-}
-
-/// Few points are little evidence, however sure each of them is.
-void doubtFewPoints(MapReport& report) {
-  constexpr std::uint64_t kFewPoints = 200;
-  if (report.points >= kFewPoints || report.counts.keyframes == 0) return;
-  report.doubts.push_back(fmt::format("the map has {} points", report.points));
 }
 
 void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
@@ -191,13 +183,19 @@ std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
   return {{"replaced-result", text}};
 }
 
+/// All files that a run reads.
+std::vector<std::filesystem::path> inputsOf(const MappingArguments& arguments,
+                                            const RecordingSource& source) {
+  std::vector<std::filesystem::path> inputs = inputsOf(source);
+  if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
+  return inputs;
+}
+
 /// Refuses a folder with an input. One that holds something else than an earlier result of the same
 /// kind is probably a mistake.
 void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
                         const MappingArguments& arguments, const RecordingSource& source) {
-  std::vector<std::filesystem::path> inputs = inputsOf(source);
-  if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
-  refuseToReplace(folder, inputs);
+  refuseToReplace(folder, inputsOf(arguments, source));
   std::error_code ignored;
   if (arguments.force || !std::filesystem::is_directory(folder, ignored)) return;
   if (std::filesystem::is_empty(folder)) return;
@@ -328,8 +326,8 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
   }
   PoseVerdict verdict = survey.judgePoses(options.mapper);
   printWarnings(verdict.warnings);
-  report.warnings.insert(report.warnings.end(), verdict.warnings.begin(), verdict.warnings.end());
-  report.doubts.insert(report.doubts.end(), verdict.doubts.begin(), verdict.doubts.end());
+  append(report.warnings, std::move(verdict.warnings));
+  append(report.doubts, std::move(verdict.doubts));
   if (!held->isWhole()) return nullptr;
   return held;
 }
@@ -390,7 +388,10 @@ std::shared_ptr<const MapSnapshot> MapCommand::describe(MappingRun& run, bool st
 
 void MapCommand::judgePoints(const MapCloud& points) {
   warnOfNoPoints(report);
-  doubtFewPoints(report);
+  constexpr std::uint64_t kFewPoints = 200;  // little evidence, however sure each of them is
+  if (report.points < kFewPoints && report.counts.keyframes > 0) {
+    report.doubts.push_back(fmt::format("the map has {} points", report.points));
+  }
   warnOfFarPoints(points, report);
 }
 
@@ -460,9 +461,7 @@ class Watchers {
   Watchers(const MapArguments& arguments, const MapCommand& command) {
     if (arguments.view) all_.push_back(window_ = openWindow());
     if (arguments.record_frames.empty()) return;
-    std::vector<std::filesystem::path> inputs = inputsOf(command.source());
-    if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
-    refuseToReplace(arguments.record_frames, inputs);
+    refuseToReplace(arguments.record_frames, inputsOf(arguments, command.source()));
     all_.push_back(
         mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force));
   }

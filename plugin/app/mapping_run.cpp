@@ -194,17 +194,10 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
   report.view = makeReferenceView(rig.cameras[reference].model, options.keyframe.view);
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (c == reference || !isSelected(static_cast<int>(c), options.cameras)) continue;
-    const double distance_m =
-        (rig.cameras[c].T_rig_cam.translation - rig.cameras[reference].T_rig_cam.translation)
-            .norm();
+    const double distance_m = baselineOf(rig.cameras[c], rig.cameras[reference]);
     if (distance_m == 0) continue;  // as good as one camera
     report.baseline_m = std::min(report.baseline_m.value_or(distance_m), distance_m);
   }
-}
-
-template <typename Value>
-void append(std::vector<Value>& all, std::vector<Value> more) {
-  std::move(more.begin(), more.end(), std::back_inserter(all));
 }
 
 }  // namespace
@@ -257,8 +250,6 @@ void MappingRun::describe(MapReport& report, bool stopped) {
       outside ? noEventText(options.interval(), read) : whyNoKeyframe(status, options);
   error_ = {std::string("there is no keyframe: ") + why.what(), why.options};
 }
-
-// --- A recording that is read twice --------------------------------------------------------------
 
 void HeldRecording::hold(Sample sample) {
   bytes_left_ -= sizeof(Held);

@@ -29,37 +29,6 @@ fs::path configFolder() {
   return fs::is_directory(source, error) ? source : fs::path();
 }
 
-}  // namespace
-
-std::vector<std::string> configNames() {
-  std::vector<std::string> names;
-  const fs::path folder = configFolder();
-  if (folder.empty()) return names;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == kSuffix) names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-fs::path findConfig(const std::string& name_or_path) {
-  std::error_code ignored;
-  const fs::path path = name_or_path;
-  if (fs::is_regular_file(path, ignored)) return path;
-  if (path.extension() == kSuffix) {
-    if (fs::exists(path, ignored)) return path;  // reading it says what it is
-    throw UsageError(name_or_path + ": no such option file");
-  }
-  const std::vector<std::string> names = configNames();
-  if (std::binary_search(names.begin(), names.end(), name_or_path)) {
-    return configFolder() / (name_or_path + kSuffix);
-  }
-  throw UsageError(fmt::format("--config {}: no such option file: {}", inQuotes(name_or_path),
-                               expectedName(name_or_path, names)));
-}
-
-namespace {
-
 /// With all links followed, as far as the path exists.
 fs::path resolved(const fs::path& path) {
   std::error_code error;
@@ -90,6 +59,33 @@ fs::path linkTo(const fs::path& input, const fs::path& folder) {
 }
 
 }  // namespace
+
+std::vector<std::string> configNames() {
+  std::vector<std::string> names;
+  const fs::path folder = configFolder();
+  if (folder.empty()) return names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == kSuffix) names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path findConfig(const std::string& name_or_path) {
+  std::error_code ignored;
+  const fs::path path = name_or_path;
+  if (fs::is_regular_file(path, ignored)) return path;
+  if (path.extension() == kSuffix) {
+    if (fs::exists(path, ignored)) return path;  // reading it says what it is
+    throw UsageError(name_or_path + ": no such option file");
+  }
+  const std::vector<std::string> names = configNames();
+  if (std::binary_search(names.begin(), names.end(), name_or_path)) {
+    return configFolder() / (name_or_path + kSuffix);
+  }
+  throw UsageError(fmt::format("--config {}: no such option file: {}", inQuotes(name_or_path),
+                               expectedName(name_or_path, names)));
+}
 
 std::vector<fs::path> inputsOf(const RecordingSource& source) {
   std::vector<fs::path> inputs = source.files;

@@ -61,6 +61,17 @@ bool isOutOfMemory(std::string_view text) {
   return false;
 }
 
+/// Flushes stdout. @return the status, or a failure if stdout cannot be written.
+int finished(int status) {
+  errno = 0;
+  std::cout.flush();
+  const bool flushed = std::fflush(stdout) == 0;
+  if (flushed && std::cout && std::ferror(stdout) == 0) return status;
+  // errno is 0 if an earlier flush failed.
+  return fail("the output cannot be written" +
+              (errno != 0 ? std::string(": ") + std::strerror(errno) : std::string()));
+}
+
 }  // namespace
 
 UserError userError(const std::exception& error) {
@@ -85,21 +96,6 @@ UserError userError(const std::exception& error) {
 }
 
 std::string inWords(const std::exception& error) { return userError(error).text; }
-
-namespace {
-
-/// Flushes stdout. @return the status, or a failure if stdout cannot be written.
-int finished(int status) {
-  errno = 0;
-  std::cout.flush();
-  const bool flushed = std::fflush(stdout) == 0;
-  if (flushed && std::cout && std::ferror(stdout) == 0) return status;
-  // errno is 0 if an earlier flush failed.
-  return fail("the output cannot be written" +
-              (errno != 0 ? std::string(": ") + std::strerror(errno) : std::string()));
-}
-
-}  // namespace
 
 int fail(const std::string& message, int status) {
   std::cerr << "event-fusion: error: " << message << "\n";

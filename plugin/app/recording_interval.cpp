@@ -3,10 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iostream>
 #include <stdexcept>
-#include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/program.h"
@@ -93,7 +91,5 @@ int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t pos
   return fail(fmt::format("{}; {} events and {} poses before it are written to {}", damage, events,
                           poses, out.string()));
 }
-
-void warnOfLosses(const RecordingCounts& counts) { printWarnings(lossWarnings(counts)); }
 
 }  // namespace efm

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -68,8 +67,5 @@ void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& record
 /// @return the process's exit status.
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
               const std::filesystem::path& out);
-
-/// Prints `lossWarnings` to stderr.
-void warnOfLosses(const RecordingCounts& counts);
 
 }  // namespace efm

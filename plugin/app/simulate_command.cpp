@@ -89,6 +89,28 @@ void setPixels(const SimulateArguments& arguments, Simulation& simulation) {
   simulation.noise.validate();
 }
 
+void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    return command.add_option(name, value, help)->group("Pixels (ideal by default)");
+  };
+  add("--threshold-on", arguments.threshold_on,
+      "Increase of log intensity per ON event; by default the preset's, or 0.3");
+  add("--threshold-off", arguments.threshold_off,
+      "Decrease of log intensity per OFF event; by default the preset's, or 0.3");
+  add("--mismatch", arguments.mismatch,
+      "Standard deviation of the pixels' thresholds, as a fraction of them, 0 to 0.5")
+      ->capture_default_str();
+  add("--refractory-us", arguments.refractory_us,
+      "Dead time of a pixel after an event, in microseconds")
+      ->capture_default_str();
+  add("--noise-hz", arguments.noise.background_hz, "Background noise: events per second and pixel")
+      ->capture_default_str();
+  add("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
+      ->capture_default_str();
+  add("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
+      ->capture_default_str();
+}
+
 }  // namespace
 
 int runSimulate(const SimulateArguments& arguments) {
@@ -118,32 +140,6 @@ int runSimulate(const SimulateArguments& arguments) {
   fmt::print("written to {}\n", arguments.out.string());
   return 0;
 }
-
-namespace {
-
-void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
-  const auto add = [&](const char* name, auto& value, const char* help) {
-    return command.add_option(name, value, help)->group("Pixels (ideal by default)");
-  };
-  add("--threshold-on", arguments.threshold_on,
-      "Increase of log intensity per ON event; by default the preset's, or 0.3");
-  add("--threshold-off", arguments.threshold_off,
-      "Decrease of log intensity per OFF event; by default the preset's, or 0.3");
-  add("--mismatch", arguments.mismatch,
-      "Standard deviation of the pixels' thresholds, as a fraction of them, 0 to 0.5")
-      ->capture_default_str();
-  add("--refractory-us", arguments.refractory_us,
-      "Dead time of a pixel after an event, in microseconds")
-      ->capture_default_str();
-  add("--noise-hz", arguments.noise.background_hz, "Background noise: events per second and pixel")
-      ->capture_default_str();
-  add("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
-      ->capture_default_str();
-  add("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
-      ->capture_default_str();
-}
-
-}  // namespace
 
 void addSimulate(CLI::App& app, Run& run) {
   CLI::App& command = *app.add_subcommand(

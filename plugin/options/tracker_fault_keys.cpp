@@ -97,12 +97,4 @@ std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const Tracker
 
 std::string knownTrackerFaults() { return fmt::format("{}", fmt::join(faultKeys(), ", ")); }
 
-void requireKeyframeLength(const TrackerFaults& faults) {
-  const KeyframeNoiseOptions& keyframe = faults.perturbation.keyframe;
-  if (!keyframe.any() || keyframe.length_ns) return;
-  throw std::invalid_argument(
-      "keyframe_s: must be given with keyframe_noise_m and keyframe_noise_deg, 0.001 to 1e6 "
-      "(seconds)");
-}
-
 }  // namespace efm

@@ -24,8 +24,4 @@ std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const Tracker
 /// "noise_m, noise_deg, ...".
 std::string knownTrackerFaults();
 
-/// For commands without options for keyframes.
-/// @throws std::invalid_argument where there is noise per keyframe, but no length of a keyframe.
-void requireKeyframeLength(const TrackerFaults& faults);
-
 }  // namespace efm

@@ -80,7 +80,10 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
 /// options of the first choice.
 void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice choice,
                              FusionMapperOptions chosen) {
-  if (!choice.found_scene && status_.choices > 0) return keepOptions();
+  if (!choice.found_scene && status_.choices > 0) {
+    options_.automatic = {};
+    return mapper_.configure(options_.mapper.policy, planes());
+  }
   if (data) {
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
     const std::int64_t begin_ns = std::min(segment_.begin_ns, data->window.t0_ns);
@@ -179,12 +182,6 @@ void MappingSession::fitIntoSegments(std::int64_t end_ns) {
   const double former_s = policy.window_s;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
   applyShorterWindow(former_s);
-}
-
-/// Goes on with the options of the first choice.
-void MappingSession::keepOptions() {
-  options_.automatic = {};
-  mapper_.configure(options_.mapper.policy, planes());
 }
 
 /// Goes on with the options of a choice.

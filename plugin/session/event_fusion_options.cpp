@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "mapping/base/option.h"
 #include "maps/cloud/keyframe_cloud.h"
 
 namespace efm {
@@ -22,7 +21,7 @@ RigSetup readRigSetup(const RigOptions& options) {
 void EventFusionOptions::validate() const {
   mapper.validate();
   cloud.validate();
-  refinement.validate();
+  refinement.refiner.validate();
   live.validate();
 }
 

@@ -78,23 +78,10 @@ double eventRate(const WindowData& data) {
   return static_cast<double>(events) / secondsBetween(data.window.t0_ns, data.window.t1_ns);
 }
 
-std::unique_ptr<FirstLook> firstLookFor(const EventFusionOptions& options) {
-  if (options.live.enabled || !options.automatic.any()) return nullptr;
-  return std::make_unique<FirstLook>(options);
-}
-
 FirstLook::FirstLook(const EventFusionOptions& options)
     : rig_(options),
       pose_source_(options.rig.pose_source),
       mapper_(surveyOptions(options.mapper, kWindowS)) {}
-
-void FirstLook::add(const Sample& sample) {
-  if (const auto* packet = std::get_if<EventPacket>(&sample)) {
-    addEvents(*packet);
-  } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
-    addPose(*pose);
-  }
-}
 
 void FirstLook::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
@@ -150,8 +137,10 @@ void FirstLook::keep(const WindowData& data) {
 }
 
 bool FirstLook::take(const Sample& sample) {
+  if (!takes_) return false;
   try {
-    if (takes_) add(sample);
+    if (const auto* packet = std::get_if<EventPacket>(&sample)) addEvents(*packet);
+    if (const auto* pose = std::get_if<PoseSample>(&sample)) addPose(*pose);
   } catch (const std::exception&) {
     takes_ = false;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,7 +48,6 @@ class FirstLook {
   explicit FirstLook(const EventFusionOptions& options);
 
   /// @throws std::exception for a sample that a MappingSession rejects, too.
-  void add(const Sample& sample);
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
   /// Adds a sample, unless a MappingSession rejects it or rejected an earlier one.
@@ -75,9 +73,5 @@ class FirstLook {
   double lever_m_ = 0;
   double most_events_per_s_ = 0;  // of those that were chosen
 };
-
-/// The first look of a playback with automatic options; null in live operation, which cannot look
-/// ahead.
-std::unique_ptr<FirstLook> firstLookFor(const EventFusionOptions& options);
 
 }  // namespace efm

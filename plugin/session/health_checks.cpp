@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
@@ -137,11 +136,6 @@ void checkParts(const Findings& findings, Warnings& warnings) {
   }
   warnings = missingParts(cameras, findings.events().has_value(),
                           findings.recording.usedPoses() != nullptr);
-}
-
-template <typename Value>
-void append(std::vector<Value>& all, std::vector<Value> more) {
-  std::move(more.begin(), more.end(), std::back_inserter(all));
 }
 
 void checkDepths(const Findings& findings, Warnings& warnings) {

@@ -4,7 +4,9 @@
 #include <fmt/core.h>
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
@@ -93,6 +95,11 @@ template <typename... Values>
 void addWarning(std::vector<Warning>& warnings, const char* name,
                 fmt::format_string<Values...> text, Values&&... values) {
   warnings.push_back({name, fmt::format(text, std::forward<Values>(values)...)});
+}
+
+template <typename Value>
+void append(std::vector<Value>& all, std::vector<Value> more) {
+  std::move(more.begin(), more.end(), std::back_inserter(all));
 }
 
 // The parts of `warningsOf`, in files of their own.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -17,6 +16,21 @@ constexpr std::int64_t kLateIntervals = 100;
 
 std::int64_t intervalOf(std::int64_t t_ns) {
   return t_ns / kIntervalNs - (t_ns % kIntervalNs < 0 ? 1 : 0);
+}
+
+std::uint64_t bytesOf(const EventPacket& packet) {
+  return sizeof(EventPacket) + packet.events.capacity() * sizeof(Event);
+}
+
+/// Without overflow: times are not checked yet.
+bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns = kFarAheadNs) {
+  return t_ns > other_ns &&
+         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
+             static_cast<std::uint64_t>(limit_ns);
+}
+
+EventPacket withoutEvents(const EventPacket& packet) {
+  return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
 }
 
 }  // namespace
@@ -61,25 +75,6 @@ void EventBudget::endInterval(std::vector<Event>& passed) {
   passed.insert(passed.end(), chosen.begin(), chosen.end());
   held_.clear();
 }
-
-namespace {
-
-std::uint64_t bytesOf(const EventPacket& packet) {
-  return sizeof(EventPacket) + packet.events.capacity() * sizeof(Event);
-}
-
-/// Without overflow: times are not checked yet.
-bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns = kFarAheadNs) {
-  return t_ns > other_ns &&
-         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
-             static_cast<std::uint64_t>(limit_ns);
-}
-
-EventPacket withoutEvents(const EventPacket& packet) {
-  return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
-}
-
-}  // namespace
 
 template <typename Input>
 void InputQueue::Stream<Input>::follow(std::int64_t t_ns) {

@@ -14,13 +14,6 @@ constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
 
 }  // namespace
 
-std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
-  const auto within = [](std::int64_t t) { return std::clamp(t, -kEndOfTimeNs, kEndOfTimeNs); };
-  return within(within(t_ns) + time_offset_ns);
-}
-
-// --- Late data and clock resets ------------------------------------------------------------------
-
 std::optional<std::int64_t> LiveGuard::admit(FusionMapper& mapper, EventPacket& packet) const {
   if (!options_.enabled) return std::nullopt;
   if (mapper.isOlder(packet.camera, packet.events)) {
@@ -68,8 +61,6 @@ std::vector<std::function<void()>> LiveGuard::beginClock() {
   return std::exchange(held_, {});
 }
 
-// --- Jumps of the tracker ------------------------------------------------------------------------
-
 bool LiveGuard::holdsPose(const NoisyPose& pose) {
   if (!options_.enabled || (!jumped() && !isJump(pose))) return false;
   after_jump_.push_back(pose);
@@ -97,8 +88,6 @@ std::vector<NoisyPose> LiveGuard::beginSegment() {
   newest_pose_.reset();
   return std::exchange(after_jump_, {});
 }
-
-// --- Missing events ------------------------------------------------------------------------------
 
 void LiveGuard::noteMissing(int camera, const MissingEvents& missing) {
   MissingEvents& noted = missing_[camera];
@@ -133,8 +122,6 @@ void LiveGuard::dropAllMissing(FusionMapper& mapper) {
   dropOverdue(mapper, kMaxTimeNs);
   missing_.clear();
 }
-
-// --- Waits ---------------------------------------------------------------------------------------
 
 bool LiveGuard::fillsQueue(std::uint64_t events) const {
   return options_.enabled && static_cast<double>(events) > options_.queueEvents() / 2;

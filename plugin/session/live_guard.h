@@ -29,9 +29,6 @@ struct NoisyPose {
   std::optional<PoseNoise> noise;
 };
 
-/// The time of an event on the clock of the poses, for a time that is not checked yet.
-std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns);
-
 /// Decides which input of live operation may pass to the mapper now. A sensor does not wait and
 /// cannot be read again: data may come late, a clock may go back, the tracker may jump, packets may
 /// be missing, and poses or events may not come at all. In playback all input passes, because the

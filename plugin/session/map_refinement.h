@@ -23,8 +23,6 @@ struct MapRefinementOptions {
   /// keyframe is refined before the next one is made, and the same recording gives the same map.
   bool background = false;
   RefinementOptions refiner;
-
-  void validate() const { refiner.validate(); }
 };
 
 /// The state of a refinement so far.

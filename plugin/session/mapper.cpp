@@ -69,8 +69,6 @@ Mapper::~Mapper() {
   if (!runsHere()) stop();
 }
 
-// --- Input -------------------------------------------------------------------------------------
-
 void Mapper::add(Sample sample) {
   auto* const packet = std::get_if<EventPacket>(&sample);
   auto* const pose = std::get_if<PoseSample>(&sample);
@@ -122,8 +120,6 @@ void Mapper::stop() {
   const std::lock_guard<std::mutex> lock(join_mutex_);
   if (thread_.joinable()) thread_.join();
 }
-
-// --- The worker --------------------------------------------------------------------------------
 
 /// One turn in the caller's thread.
 void Mapper::workHere(Batch batch) {
@@ -253,7 +249,6 @@ bool Mapper::mapNext(std::exception_ptr& error) {
               [&] { warnings = warningsOfSilence(*keyframe); });
       forgetOldest();
       const std::lock_guard<std::mutex> published(mutex_);
-      live_.failing = false;
       newest_depth_ = keyframe->map.depth;
       newest_planes_ = session_.chosen().planes;
     }
@@ -292,8 +287,6 @@ void Mapper::forgetOldest() {
   if (!options_.enabled || keyframes.size() <= std::size_t(options_.max_keyframes)) return;
   keyframes.erase(keyframes.begin());
 }
-
-// --- What callers see --------------------------------------------------------------------------
 
 /// Moves cloud and keyframes to their refined poses, so that all parts agree.
 std::shared_ptr<MapSnapshot> Mapper::makeSnapshot(bool with_points) {
@@ -394,7 +387,6 @@ SessionStatus Mapper::status() const {
   live.refused_poses += live_.refused_poses + rejected_poses;
   live.errors = live_.errors;
   live.last_error = live_.last_error;
-  live.failing = live_.failing;
   return status;
 }
 
@@ -421,8 +413,6 @@ void Mapper::setClock(ProcessorClock clock) {
   const std::lock_guard<std::mutex> lock(mutex_);
   clock_ = std::move(clock);
 }
-
-// --- Errors and losses -------------------------------------------------------------------------
 
 /// Runs a step. What it throws is the caller's in playback; in live operation it is counted.
 /// @param error keeps the first one.
@@ -472,7 +462,6 @@ void Mapper::noteError(const char* doing, Fault fault) noexcept {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_input) ++live_.errors;
     if (fault == Fault::kPose) ++live_.refused_poses;
-    if (fault == Fault::kMapping) live_.failing = true;
   }
   try {
     const std::string text = errorText();

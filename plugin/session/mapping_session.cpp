@@ -33,9 +33,11 @@ MappingSession::MappingSession(const EventFusionOptions& options)
       pose_source_(options.rig.pose_source),
       guard_(options.live),
       mapper_(mapperOptions(options)),
-      first_look_(firstLookFor(options)),
       cloud_(options.cloud, options.movableKeyframes()) {
   rig_.declare(mapper_);
+  if (!options.live.enabled && options.automatic.any()) {  // a sensor cannot be looked at ahead
+    first_look_ = std::make_unique<FirstLook>(options);
+  }
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }
@@ -190,8 +192,6 @@ void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
   guard_.noteMissing(camera, missing);
 }
 
-// --- Pieces of the input -------------------------------------------------------------------------
-
 /// Whether the tracker jumped, and all events before the jump are here.
 bool MappingSession::segmentEnds() const {
   return guard_.jumped() && (finished_ || mapper_.eventsCompleteNs() >= guard_.beforeJumpNs());
@@ -269,8 +269,6 @@ void MappingSession::finish() {
   if (error) std::rethrow_exception(error);
 }
 
-// --- What waits ----------------------------------------------------------------------------------
-
 /// If no window can be mapped.
 void MappingSession::limitWaits() {
   if (finished_) return;
@@ -332,8 +330,6 @@ void MappingSession::dropOlderHalf() {
   throw std::invalid_argument(why);
 }
 
-// --- Keyframes -----------------------------------------------------------------------------------
-
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
                                    const Rigid3& T_world_ref) {
   cloud_.insertFixed(points, T_world_ref);
@@ -383,7 +379,8 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
   T_odom_ref_.push_back(T_odom_ref);
   try {
-    std::vector<ViewPoint> points = pointsOf(keyframe);
+    std::vector<ViewPoint> points =
+        options_.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe);
     if (store) store(keyframe, points);
     Rigid3 T_world_ref = refinement_ ? refinement_->predict(T_odom_ref) : T_odom_ref;
     {
@@ -424,10 +421,6 @@ void MappingSession::applyPending() {
   if (!refinement_) return;
   const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
   moveKeyframes(0);
-}
-
-std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe) const {
-  return options_.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe);
 }
 
 SessionStatus MappingSession::status() const {

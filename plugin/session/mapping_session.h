@@ -107,7 +107,6 @@ class MappingSession {
   const DepthPlanesOptions& planes() const {
     return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
   }
-  std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
   std::size_t heldEvents() const { return mapper_.heldEvents() + guard_.heldEvents(); }
   void feed(EventPacket packet);
   void completeRig();
@@ -141,7 +140,6 @@ class MappingSession {
   bool applyShorterWindow(double former_s);
   bool shortenWindows(double events_per_s);
   void fitIntoSegments(std::int64_t end_ns);
-  void keepOptions();
   void lookAgain(const Window& window);
 
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"

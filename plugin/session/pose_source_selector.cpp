@@ -9,15 +9,8 @@
 namespace efm {
 
 std::string asText(const PoseSourceId& source) {
-  switch (source.kind) {
-    case PoseKind::kPose:
-      return "poses " + inQuotes(source.label);
-    case PoseKind::kOdometry:
-      return "odometry " + inQuotes(source.label);
-    case PoseKind::kActions:
-      break;
-  }
-  return "actions";
+  if (source.kind == PoseKind::kActions) return "actions";
+  return (source.kind == PoseKind::kPose ? "poses " : "odometry ") + inQuotes(source.label);
 }
 
 std::vector<StampedPose> PoseSourceSelector::add(const PoseSourceId& source,

@@ -6,29 +6,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
 
-const char* nameOf(PoseMistake mistake) {
-  switch (mistake) {
-    case PoseMistake::kInverted:
-      return "poses-inverted";
-    case PoseMistake::kQuaternionOrder:
-      return "quaternion-order";
-    case PoseMistake::kCamerasSwapped:
-    case PoseMistake::kStereoInverted:
-      return "cameras-swapped";
-    case PoseMistake::kAxes:
-      return "axis-convention";
-    case PoseMistake::kTimeShift:
-      return "time-shift";
-    case PoseMistake::kUnknown:
-      break;
-  }
-  return "poses-unexplained";
-}
+constexpr NamedChoice<PoseMistake> kNames[] = {{PoseMistake::kInverted, "poses-inverted"},
+                                               {PoseMistake::kQuaternionOrder, "quaternion-order"},
+                                               {PoseMistake::kCamerasSwapped, "cameras-swapped"},
+                                               {PoseMistake::kStereoInverted, "cameras-swapped"},
+                                               {PoseMistake::kAxes, "axis-convention"},
+                                               {PoseMistake::kTimeShift, "time-shift"},
+                                               {PoseMistake::kUnknown, "poses-unexplained"}};
 
 /// The axes of the rig, written as axes of the body: "-y, -z, x".
 std::string axesText(const Eigen::Matrix3d& R_body_rig) {
@@ -100,21 +90,18 @@ std::string gainText(double gain) {
 
 /// A mistake beside the one that the warning's name says; two mistakes share a name.
 std::string alternativeText(PoseMistake mistake) {
-  switch (mistake) {
-    case PoseMistake::kCamerasSwapped:
-      return "the events of cameras 0 and 1 are exchanged";
-    case PoseMistake::kStereoInverted:
-      return "the transform between cameras 0 and 1 is inverted";
-    default:
-      return std::string("it is ") + nameOf(mistake);
+  if (mistake == PoseMistake::kCamerasSwapped) return "the events of cameras 0 and 1 are exchanged";
+  if (mistake == PoseMistake::kStereoInverted) {
+    return "the transform between cameras 0 and 1 is inverted";
   }
+  return fmt::format("it is {}", nameIn(kNames, mistake));
 }
 
 }  // namespace
 
 Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
   Warning warning;
-  warning.name = nameOf(finding.mistake);
+  warning.name = nameIn(kNames, finding.mistake);
   if (finding.mistake == PoseMistake::kUnknown) {
     warning.text =
         "the poses do not explain the events: wrong poses explain them as well; are poses, events "

@@ -72,13 +72,6 @@ std::uint64_t countBetween(const std::vector<std::int64_t>& times_ns, std::int64
                     [&](std::int64_t t_ns) { return t_ns >= from_ns && t_ns < until_ns; }));
 }
 
-/// Differences of such times do not overflow, even where nobody has checked a recording.
-std::int64_t inRange(std::int64_t t_ns) { return std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs); }
-
-std::int64_t onTrajectoryClock(std::int64_t t_ns, std::int64_t offset_ns) {
-  return inRange(inRange(t_ns) + inRange(offset_ns));
-}
-
 double distanceOf(const Rigid3& T_world_a, const Rigid3& T_world_b) {
   return (T_world_b.translation - T_world_a.translation).norm();
 }
@@ -152,7 +145,7 @@ bool RecordingStatistics::add(const Sample& sample) {
   }
   const auto* pose = std::get_if<PoseSample>(&sample);
   if (pose == nullptr) return false;
-  addPose(pose->source, pose->t_ns, pose->T_world_body, pose->T_body_rig);
+  addPose(*pose);
   return true;
 }
 
@@ -165,7 +158,6 @@ void RecordingStatistics::addEvents(const EventPacket& packet) {
   CameraStatistics& statistics = entry->second;
   const auto width = static_cast<std::size_t>(camera.model.width);
   if (is_new) {
-    statistics.label = packet.label;
     statistics.camera = camera;
     const auto offset = static_cast<std::size_t>(index);
     if (offset < options_.time_offsets_ns.size()) {
@@ -182,7 +174,7 @@ void RecordingStatistics::addEvents(const EventPacket& packet) {
   times_ns.reserve(packet.events.size());
   std::uint64_t positive = 0;
   for (const Event& event : packet.events) {
-    const std::int64_t t_ns = onTrajectoryClock(event.t_ns, offset_ns);
+    const std::int64_t t_ns = trajectoryTime(event.t_ns, offset_ns);
     statistics.rate.add(t_ns);
     positive += event.polarity ? 1 : 0;
     const std::size_t pixel = event.y * width + event.x;
@@ -198,13 +190,12 @@ void RecordingStatistics::addEvents(const EventPacket& packet) {
   events_after_poses_ += countBetween(statistics.newest_ns, *poses_.last_ns + 1, kMaxTimeNs);
 }
 
-void RecordingStatistics::addPose(const PoseSourceId& source, std::int64_t t_ns,
-                                  const Rigid3& T_world_body, const Rigid3& T_body_rig) {
-  t_ns = inRange(t_ns);
-  const auto [entry, is_new] = pose_sources_.try_emplace(source);
+void RecordingStatistics::addPose(const PoseSample& pose) {
+  const std::int64_t t_ns = trajectoryTime(pose.t_ns, 0);
+  const auto [entry, is_new] = pose_sources_.try_emplace(pose.source);
   if (is_new) entry->second.order = pose_sources_.size();
-  const Rigid3 T_world_rig = T_world_body * options_.T_body_rig.value_or(T_body_rig);
-  entry->second.add({t_ns, T_world_rig}, durationFromSeconds(options_.window_s));
+  entry->second.add({t_ns, rigPose(pose, options_.T_body_rig)},
+                    durationFromSeconds(options_.window_s));
   countAroundPose(t_ns);
 }
 

@@ -4,15 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "mapping/events/event.h"
-#include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/session/event_fusion_options.h"
@@ -87,7 +84,6 @@ struct StreamStatistics {
 
 /// The events of one camera.
 struct CameraStatistics {
-  std::string label;
   RigCamera camera;
   StreamStatistics events;
   std::uint64_t positive = 0;  ///< Events of positive polarity.
@@ -131,9 +127,7 @@ class RecordingStatistics {
   bool add(const Sample& sample);
   /// @param packet with its events in time order.
   void addEvents(const EventPacket& packet);
-  /// @param T_body_rig of the recording.
-  void addPose(const PoseSourceId& source, std::int64_t t_ns, const Rigid3& T_world_body,
-               const Rigid3& T_body_rig);
+  void addPose(const PoseSample& pose);
   /// The calibrations that a map used instead of the recorded ones.
   void setCameras(const std::vector<RigCamera>& cameras);
 

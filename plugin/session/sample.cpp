@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/sample.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "mapping/geometry/timestamp.h"
+
 namespace efm {
+
+std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
+  const auto within = [](std::int64_t t) { return std::clamp(t, -kEndOfTimeNs, kEndOfTimeNs); };
+  return within(within(t_ns) + within(time_offset_ns));
+}
 
 std::int64_t nearestTick(std::int64_t t_ns) {
   std::int64_t ticks = t_ns / kTickNs;

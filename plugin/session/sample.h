@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,6 +58,10 @@ struct OtherSample {
 inline Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {
   return pose.T_world_body * T_body_rig.value_or(pose.T_body_rig);
 }
+
+/// The time of an event on the clock of the poses. Neither time is checked yet: both are limited to
+/// kEndOfTimeNs, so that their sum and differences of such times do not overflow.
+std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns);
 
 using Sample = std::variant<EventPacket, PoseSample, OtherSample>;
 

@@ -84,24 +84,14 @@ class StageTimer : public StageHook {
   StageTimer(StageTimes& times, const ProcessorClock& clock) : times_(times), clock_(clock) {}
 
   void begin(Stage stage) override {
-    double StageSeconds::*const sum = sumOf(stage);
+    double StageSeconds::*const sum = stage == Stage::kFilter  ? &StageSeconds::filter
+                                      : stage == Stage::kSweep ? &StageSeconds::sweep
+                                                               : &StageSeconds::depth;
     scope_.emplace(times_.real.*sum, times_.cpu.*sum, clock_);
   }
   void end(Stage) override { scope_.reset(); }
 
  private:
-  static double StageSeconds::*sumOf(Stage stage) {
-    switch (stage) {
-      case Stage::kFilter:
-        return &StageSeconds::filter;
-      case Stage::kSweep:
-        return &StageSeconds::sweep;
-      case Stage::kDepth:
-        break;
-    }
-    return &StageSeconds::depth;
-  }
-
   StageTimes& times_;
   const ProcessorClock& clock_;
   std::optional<SecondsScope> scope_;
@@ -163,7 +153,6 @@ struct LiveStatus {
   std::uint64_t errors = 0;  ///< Of the mapping and callbacks; see `RefinementState`, too.
   std::string last_error;    ///< Of these and of refused observations; empty: none.
   std::string too_large;     ///< Why the queue holds no window; empty: it does.
-  bool failing = false;      ///< The last keyframe could not be made.
 
   /// The part of the received events that is lost (`EventFateRow::is_loss`), 0 to 1.
   double dropRatio() const;

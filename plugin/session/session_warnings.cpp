@@ -16,17 +16,13 @@ namespace {
 /// What makes a window full, by the policy.
 std::string fullWindow(const KeyframePolicyOptions& options) {
   const std::string duration = formatSeconds(durationFromSeconds(options.window_s));
-  switch (options.policy) {
-    case KeyframePolicyKind::kEvents:
-      return fmt::format("{} events (window_events)", options.window_events);
-    case KeyframePolicyKind::kBaseline:
-      return fmt::format(
-          "at most {} s (window_s) with motion enough (min_baseline_ratio, min_visible_fraction)",
-          duration);
-    case KeyframePolicyKind::kPeriod:
-      break;
+  if (options.policy == KeyframePolicyKind::kEvents) {
+    return fmt::format("{} events (window_events)", options.window_events);
   }
-  return duration + " s (window_s)";
+  if (options.policy == KeyframePolicyKind::kPeriod) return duration + " s (window_s)";
+  return fmt::format(
+      "at most {} s (window_s) with motion enough (min_baseline_ratio, min_visible_fraction)",
+      duration);
 }
 
 OptionHint whyNoPoses(const SessionStatus& status) {
@@ -38,69 +34,6 @@ OptionHint whyNoPoses(const SessionStatus& status) {
   }
   return {why, {{"rig", "pose_source"}}};
 }
-
-}  // namespace
-
-OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
-  if (!status.events) return OptionHint("the recording has no events");
-  if (!status.poses) return whyNoPoses(status);
-  const std::int64_t start_ns = status.events->first_ns;
-  const auto text = [&](const TimeSpan& span) {
-    return timeText(span.first_ns, span.last_ns, start_ns);
-  };
-  const std::string spans =
-      fmt::format("the events span {}, the poses {}", text(*status.events), text(*status.poses));
-  const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
-  const std::int64_t last_ns = std::min(status.events->last_ns, status.poses->last_ns);
-  if (first_ns > last_ns) {
-    return fmt::format("{}: they miss each other by {} s", spans,
-                       formatSeconds(first_ns - last_ns));
-  }
-  if (status.live && !status.live->too_large.empty()) {
-    return {status.live->too_large, {{"keyframes", "window_s"}, {"live", "max_queue_events"}}};
-  }
-  const EventCounts counts = status.counts.total();
-  if (counts[EventFate::kFiltered] > 0 && counts[EventFate::kUsed] == 0 &&
-      counts[EventFate::kFiltered] + counts[EventFate::kDropped] == counts.read) {
-    return fmt::format(
-        "the filters took all {} events of the selected cameras for noise: [filter] is too strict "
-        "for this recording",
-        counts[EventFate::kFiltered]);
-  }
-  if (counts[EventFate::kOutsideLens] > 0 && counts[EventFate::kUsed] == 0 &&
-      counts[EventFate::kOutsideLens] + counts[EventFate::kFiltered] +
-              counts[EventFate::kDropped] ==
-          counts.read) {
-    return fmt::format(
-        "{} of {} events lie outside the lens: its model has no viewing ray for their pixels, so "
-        "the calibration is wrong",
-        counts[EventFate::kOutsideLens], counts.read);
-  }
-  const std::uint64_t without_pose = status.counts.keyframes_without_pose;
-  const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
-  if (options.only_window) {
-    const Window& window = *options.only_window;
-    const std::string interval = "the window " + text({window.t0_ns, window.t1_ns});
-    if (saw_nothing) {
-      return fmt::format("the selected cameras have no event in {}; {}", interval, spans);
-    }
-    return fmt::format("there is no pose at the reference time {} of {}; {}",
-                       timeText(window.t_ref_ns, start_ns), interval, spans);
-  }
-  if (saw_nothing) {
-    return "the selected cameras have no event in any window that was full: " + spans;
-  }
-  if (without_pose > 0) {
-    return fmt::format(
-        "{} windows were full, but had no pose at their reference times: poses are more than "
-        "max_pose_gap_s apart there",
-        without_pose);
-  }
-  return fmt::format("no window of {} was full: {}, {} s of them together",
-                     fullWindow(options.policy), spans, formatSeconds(last_ns - first_ns));
-}
-
-namespace {
 
 using Warnings = std::vector<Warning>;
 
@@ -230,6 +163,65 @@ void addKeyframes(const SessionStatus& status, Warnings& warnings) {
 }
 
 }  // namespace
+
+OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
+  if (!status.events) return OptionHint("the recording has no events");
+  if (!status.poses) return whyNoPoses(status);
+  const std::int64_t start_ns = status.events->first_ns;
+  const auto text = [&](const TimeSpan& span) {
+    return timeText(span.first_ns, span.last_ns, start_ns);
+  };
+  const std::string spans =
+      fmt::format("the events span {}, the poses {}", text(*status.events), text(*status.poses));
+  const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
+  const std::int64_t last_ns = std::min(status.events->last_ns, status.poses->last_ns);
+  if (first_ns > last_ns) {
+    return fmt::format("{}: they miss each other by {} s", spans,
+                       formatSeconds(first_ns - last_ns));
+  }
+  if (status.live && !status.live->too_large.empty()) {
+    return {status.live->too_large, {{"keyframes", "window_s"}, {"live", "max_queue_events"}}};
+  }
+  const EventCounts counts = status.counts.total();
+  if (counts[EventFate::kFiltered] > 0 && counts[EventFate::kUsed] == 0 &&
+      counts[EventFate::kFiltered] + counts[EventFate::kDropped] == counts.read) {
+    return fmt::format(
+        "the filters took all {} events of the selected cameras for noise: [filter] is too strict "
+        "for this recording",
+        counts[EventFate::kFiltered]);
+  }
+  if (counts[EventFate::kOutsideLens] > 0 && counts[EventFate::kUsed] == 0 &&
+      counts[EventFate::kOutsideLens] + counts[EventFate::kFiltered] +
+              counts[EventFate::kDropped] ==
+          counts.read) {
+    return fmt::format(
+        "{} of {} events lie outside the lens: its model has no viewing ray for their pixels, so "
+        "the calibration is wrong",
+        counts[EventFate::kOutsideLens], counts.read);
+  }
+  const std::uint64_t without_pose = status.counts.keyframes_without_pose;
+  const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
+  if (options.only_window) {
+    const Window& window = *options.only_window;
+    const std::string interval = "the window " + text({window.t0_ns, window.t1_ns});
+    if (saw_nothing) {
+      return fmt::format("the selected cameras have no event in {}; {}", interval, spans);
+    }
+    return fmt::format("there is no pose at the reference time {} of {}; {}",
+                       timeText(window.t_ref_ns, start_ns), interval, spans);
+  }
+  if (saw_nothing) {
+    return "the selected cameras have no event in any window that was full: " + spans;
+  }
+  if (without_pose > 0) {
+    return fmt::format(
+        "{} windows were full, but had no pose at their reference times: poses are more than "
+        "max_pose_gap_s apart there",
+        without_pose);
+  }
+  return fmt::format("no window of {} was full: {}, {} s of them together",
+                     fullWindow(options.policy), spans, formatSeconds(last_ns - first_ns));
+}
 
 void checkSession(const Findings& findings, Warnings& warnings) {
   if (!findings.session) return;

@@ -36,7 +36,7 @@ RecordingStatistics statisticsOf(const SyntheticRecording& recording,
                                  const StatisticsOptions& options = {}) {
   RecordingStatistics statistics(options);
   for (const StampedPose& pose : recording.poses) {
-    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
+    statistics.addPose({{PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {}});
   }
   for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
     statistics.addEvents({static_cast<int>(c), recording.cameras[c], recording.events[c]});
@@ -293,7 +293,7 @@ TEST(RecordingStatistics, CountsByTheTimesOfEventsAndPoses) {
   const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
   const PoseSourceId tracker{PoseKind::kPose, "tracker"};
   const auto add_pose = [&](const PoseSourceId& source, std::int64_t t_ns) {
-    statistics.addPose(source, t_ns, {}, {});
+    statistics.addPose({source, t_ns, {}, {}});
   };
   add_events(0, {10, 20, 30});
   add_pose(wheels, 20);

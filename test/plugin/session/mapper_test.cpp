@@ -248,7 +248,6 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
               isLive() && log_throws ? 1U : 0U);
     if (!isLive()) continue;
     EXPECT_EQ(mapper->status().live->errors, thrown);
-    EXPECT_FALSE(mapper->status().live->failing);
   }
 }
 
@@ -289,7 +288,6 @@ TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
   const SessionStatus status = mapper.status();
   expectSumsAgree(status);
   EXPECT_EQ(status.live->errors, 1U);
-  EXPECT_FALSE(status.live->failing);
   EXPECT_THAT(status.live->last_error, HasSubstr("the disk is full"));
   EXPECT_EQ(status.counts.dropped_windows[DropReason::kError], 1U);
   EXPECT_EQ(delivered, 2U) << "of three";

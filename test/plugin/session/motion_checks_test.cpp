@@ -39,7 +39,7 @@ std::vector<Warning> warningsOf(const std::vector<StampedPose>& poses,
   RigCamera camera;
   camera.model = {120, 90, focal_px, focal_px, 59.5, 44.5, DistortionModel::kNone, {}};
   for (const StampedPose& pose : poses) {
-    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
+    statistics.addPose({{PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {}});
   }
   statistics.addEvents({0, camera, events});
   std::vector<Warning> warnings;
