@@ -16,13 +16,8 @@ std::runtime_error wrongNpyHeader(const std::string& what) {
   return std::runtime_error("the array's header: " + what);
 }
 
-/// The dictionary, and the first byte of the data.
-struct NpyDictionary {
-  std::string_view text;
-  std::size_t data_begin = 0;
-};
-
-NpyDictionary npyDictionaryOf(std::string_view bytes) {
+/// The dictionary; the data follow it.
+std::string_view npyDictionaryOf(std::string_view bytes) {
   constexpr std::size_t kVersion = 6;
   if (!looksLikeNpy(bytes)) throw wrongNpyHeader("it does not begin as a NumPy array does");
   if (bytes.size() < kVersion + 4) throw wrongNpyHeader("the file ends inside it");
@@ -38,7 +33,7 @@ NpyDictionary npyDictionaryOf(std::string_view bytes) {
     length = (length << 8) | static_cast<unsigned char>(bytes[kVersion + 2 + k]);
   }
   if (length > bytes.size() - begin) throw wrongNpyHeader("the file ends inside it");
-  return {bytes.substr(begin, length), begin + length};
+  return bytes.substr(begin, length);
 }
 
 /// The text behind 'key': in the dictionary.
@@ -227,12 +222,12 @@ std::uint64_t NpyHeader::count() const {
 bool looksLikeNpy(std::string_view bytes) { return bytes.substr(0, kNpyMagic.size()) == kNpyMagic; }
 
 NpyHeader parseNpyHeader(std::string_view bytes) {
-  const NpyDictionary dictionary = npyDictionaryOf(bytes);
+  const std::string_view dictionary = npyDictionaryOf(bytes);
   NpyHeader header;
-  header.data_begin = dictionary.data_begin;
-  setNpyType(npyValueOf(dictionary.text, "descr"), header);
-  header.fortran_order = npyValueOf(dictionary.text, "fortran_order").substr(0, 5) != "False";
-  header.shape = npyShapeOf(npyValueOf(dictionary.text, "shape"), header.element_bytes);
+  header.data_begin = static_cast<std::size_t>(dictionary.end() - bytes.begin());
+  setNpyType(npyValueOf(dictionary, "descr"), header);
+  header.fortran_order = npyValueOf(dictionary, "fortran_order").substr(0, 5) != "False";
+  header.shape = npyShapeOf(npyValueOf(dictionary, "shape"), header.element_bytes);
   return header;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/point_record.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -102,13 +101,6 @@ void append(PointCloudContent& content, const Values& values) {
   }
 }
 
-template <typename Number>
-bool parseWhole(std::string_view word, double& value) {
-  const std::optional<Number> number = parseNumber<Number>(word);
-  value = static_cast<double>(number.value_or(0));
-  return number.has_value();
-}
-
 /// Rounds to the type of the field, as a binary file does.
 template <typename Real>
 bool parseReal(std::string_view word, double& value) {
@@ -133,8 +125,10 @@ bool parseAs(NumberType type, std::string_view word, double& value) {
     if constexpr (std::is_floating_point_v<Number>) {
       return parseReal<Number>(word, value);
     } else {
-      return parseWhole<std::conditional_t<std::is_signed_v<Number>, std::int64_t, std::uint64_t>>(
-          word, value);
+      using Whole = std::conditional_t<std::is_signed_v<Number>, std::int64_t, std::uint64_t>;
+      const std::optional<Whole> number = parseNumber<Whole>(word);
+      value = static_cast<double>(number.value_or(0));
+      return number.has_value();
     }
   });
 }
