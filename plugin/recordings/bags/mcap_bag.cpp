@@ -57,7 +57,6 @@ class McapBag : public ChunkedBag {
  private:
   bool readSummary();
   void scanFile();
-  static void takeTimes(const ChunkMessages& found, BagChunk& chunk);
   ChunkMessages messagesIn(ChunkBytes bytes);
   void takeSchemaOrChannel(McapRecord& record);
   BagChunk chunkOfIndex(ByteReader content) const;
@@ -171,7 +170,14 @@ void McapBag::scanFile() {
     if (chunk.size == 0) return;
     if (!chunks.empty()) chunk.first_log_ns = chunk.last_log_ns = chunks.back().last_log_ns;
     try {
-      takeTimes(readChunk(chunk), chunk);
+      const ChunkMessages found = readChunk(chunk);
+      chunk.topics = 0;
+      for (const ChunkMessages::Message& message : found.messages) {
+        const bool first = chunk.topics == 0;
+        chunk.first_log_ns = first ? message.log_ns : std::min(chunk.first_log_ns, message.log_ns);
+        chunk.last_log_ns = first ? message.log_ns : std::max(chunk.last_log_ns, message.log_ns);
+        chunk.topics |= topicBit(message.topic);
+      }
     } catch (const std::runtime_error&) {
       damage = std::current_exception();
       chunk.topics = ~std::uint64_t{0};
@@ -216,16 +222,6 @@ void McapBag::scanFile() {
   add(loose);
   if (damage && topics().empty()) std::rethrow_exception(damage);  // else nobody would say it
   setChunks(std::move(chunks));
-}
-
-void McapBag::takeTimes(const ChunkMessages& found, BagChunk& chunk) {
-  chunk.topics = 0;
-  for (const ChunkMessages::Message& message : found.messages) {
-    const bool first = chunk.topics == 0;
-    chunk.first_log_ns = first ? message.log_ns : std::min(chunk.first_log_ns, message.log_ns);
-    chunk.last_log_ns = first ? message.log_ns : std::max(chunk.last_log_ns, message.log_ns);
-    chunk.topics |= topicBit(message.topic);
-  }
 }
 
 ChunkMessages McapBag::readChunk(const BagChunk& chunk) {

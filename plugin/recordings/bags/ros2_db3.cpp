@@ -14,8 +14,6 @@
 namespace efm {
 namespace {
 
-using Database = std::unique_ptr<sqlite3, decltype(&sqlite3_close)>;
-
 /// A query whose rows are read one by one.
 class SqlQuery {
  public:
@@ -98,7 +96,7 @@ class Db3Bag : public BagSource {
   void open();
 
   std::string name_;
-  Database database_;
+  std::unique_ptr<sqlite3, decltype(&sqlite3_close)> database_;
   std::vector<std::int64_t> ids_;  // per topic
 };
 

@@ -100,17 +100,17 @@ class MessageFields {
 /// An event of an EventArray: x, y (16 bits), seconds, nanoseconds (32 bits), polarity (8 bits).
 constexpr std::size_t kRosEventBytes = 13;
 
-/// The event at `bytes`, whose seconds are at `time`. Little-endian.
-Event eventAt(const std::uint8_t* bytes, const std::uint8_t* time) {
+/// The event at `bytes`, little-endian.
+Event eventAt(const std::uint8_t* bytes) {
   Event event;
   std::uint32_t seconds;
   std::uint32_t nanoseconds;
   std::memcpy(&event.x, bytes, 2);
   std::memcpy(&event.y, bytes + 2, 2);
-  std::memcpy(&seconds, time, 4);
-  std::memcpy(&nanoseconds, time + 4, 4);
+  std::memcpy(&seconds, bytes + 4, 4);
+  std::memcpy(&nanoseconds, bytes + 8, 4);
   event.t_ns = std::int64_t{seconds} * kNanosecondsPerSecond + nanoseconds;
-  event.polarity = time[8] != 0;
+  event.polarity = bytes[12] != 0;
   return event;
 }
 
@@ -177,7 +177,7 @@ CameraSize decodeEventArray(const BagMessage& message, std::vector<Event>& event
   if (!message.cdr) {
     const std::uint8_t* event = bytes.take(count * kRosEventBytes);
     for (std::uint32_t i = 0; i < count; ++i, event += kRosEventBytes) {
-      events.push_back(eventAt(event, event + 4));
+      events.push_back(eventAt(event));
     }
     return size;
   }

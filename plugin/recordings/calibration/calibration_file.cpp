@@ -130,21 +130,15 @@ Calibration readCalibration(const std::filesystem::path& file) {
   return readUzhCalibration(file);
 }
 
-CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {
+Calibration readUzhCalibration(const std::filesystem::path& file) {
   const std::vector<double> numbers = readNumbers(file);
   if (numbers.size() != 9) {
     throw std::runtime_error(fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3",
                                          file.string(), numbers.size()));
   }
-  CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
-                                 {numbers.begin() + 4, numbers.end()});
-  model.width = size.width;
-  model.height = size.height;
-  return model;
-}
-
-Calibration readUzhCalibration(const std::filesystem::path& file) {
-  return {file, {{{readUzhCalibration(file, {0, 0}), {}, 0}}}};
+  const CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
+                                       {numbers.begin() + 4, numbers.end()});
+  return {file, {{{model, {}, 0}}}};
 }
 
 CameraModel radtanLens(const std::filesystem::path& file, const std::vector<double>& k,

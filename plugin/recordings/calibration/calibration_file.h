@@ -59,9 +59,8 @@ inline constexpr const char* kCalibrationFiles =
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
-/// radtan with five coefficients, even where all are zero.
-CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
-/// The same without the sensor's size, which the file does not have: width and height are 0.
+/// radtan with five coefficients, even where all are zero. The file does not have the sensor's
+/// size: width and height are 0.
 Calibration readUzhCalibration(const std::filesystem::path& file);
 
 /// A radtan lens without the sensor's size, which is not in the file.

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "mapping/geometry/rig.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
@@ -63,18 +62,5 @@ class YamlEntry {
 
 /// @throws std::runtime_error naming the file, and the line where it is not YAML.
 YAML::Node loadYaml(const std::string& file);
-
-/// Reads a camera from the keys camera_model (pinhole), distortion_model (radtan, equidistant or
-/// none), distortion_coeffs and resolution, and the four intrinsics fx fy cx cy.
-/// @param intrinsics_key "intrinsics" in Kalibr's files, "camera_matrix" in DSEC's.
-CameraModel readKalibrCamera(const YamlEntry& entry, const char* intrinsics_key);
-
-/// Sets the size of the sensor.
-/// @param key of the size, for errors.
-void setSensorSize(const YamlEntry& entry, const char* key, double width, double height,
-                   CameraModel& model);
-
-/// @throws std::runtime_error naming the entry, where `CameraModel::validate` refuses the model.
-void requireValid(const YamlEntry& entry, const CameraModel& model);
 
 }  // namespace efm

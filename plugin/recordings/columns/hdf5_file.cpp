@@ -160,11 +160,11 @@ std::optional<std::uint64_t> productOf(const std::vector<hsize_t>& sides, std::s
   return product;
 }
 
-/// Moves an index to the next one of a grid whose last dimension runs fastest.
-/// @return false after the last one.
-bool advance(std::vector<hsize_t>& index, std::size_t first, const std::vector<hsize_t>& ends,
+/// Moves an index to the next one of a grid of rows whose last dimension runs fastest.
+/// @return false after the last one of its row.
+bool advance(std::vector<hsize_t>& index, const std::vector<hsize_t>& ends,
              const std::vector<hsize_t>& steps) {
-  for (std::size_t i = index.size(); i-- > first;) {
+  for (std::size_t i = index.size(); i-- > 1;) {
     index[i] += steps[i];
     if (index[i] < ends[i]) return true;
     index[i] = 0;
@@ -260,7 +260,7 @@ void Hdf5Rows::readChunks(std::uint64_t first_row) {
     } else {
       placeChunk(offset);
     }
-  } while (advance(offset, 1, sides_, chunk_sides_));
+  } while (advance(offset, sides_, chunk_sides_));
 }
 
 void Hdf5Rows::readChunk(const std::vector<hsize_t>& offset) {
@@ -304,7 +304,7 @@ void Hdf5Rows::placeChunk(const std::vector<hsize_t>& offset) {
       position = position * sides_[i] + offset[i] + index[i];
     }
     positions.push_back(inside ? static_cast<std::ptrdiff_t>(position * element_bytes_) : -1);
-  } while (advance(index, 1, chunk_sides_, ones));
+  } while (advance(index, chunk_sides_, ones));
   const std::uint8_t* from = chunk_.data();
   std::uint8_t* row = rows_.data();
   for (std::uint64_t i = 0; i < chunk_sides_[0]; ++i, row += rowBytes()) {

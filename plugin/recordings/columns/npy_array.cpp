@@ -137,13 +137,6 @@ RowColumn NpyArray::columnOf(std::shared_ptr<NpyArray> array, std::size_t column
   return {std::move(array), field.offset, field.type, field.big_endian};
 }
 
-double NpyArray::number(std::uint64_t row, std::size_t column) {
-  const RowBlock& block = blockAt(row);
-  const NpyField& field = columns_[column];
-  return numberAt(block.data + (row - block.first) * row_bytes_ + field.offset, field.type,
-                  field.big_endian);
-}
-
 std::string NpyArray::placeOf(std::uint64_t row) const {
   return fmt::format("{}: row {}", name_, row);
 }

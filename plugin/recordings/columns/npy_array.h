@@ -43,8 +43,6 @@ class NpyArray : public NumberRows {
   std::size_t columns() const { return columns_.size(); }
   /// A column of an array; without such a column, which an empty array has not, any.
   static RowColumn columnOf(std::shared_ptr<NpyArray> array, std::size_t column);
-  /// A number.
-  double number(std::uint64_t row, std::size_t column = 0);
 
   bool canSeek() const override { return content_.seekableBytes() > 0; }
   std::string placeOf(std::uint64_t row) const override;

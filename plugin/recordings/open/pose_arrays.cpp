@@ -8,7 +8,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 
 #include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/columns/npy_array.h"
@@ -35,18 +34,17 @@ Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
 }
 
 /// @param first the pose's first column.
-Rigid3 poseOf(NpyArray& array, std::uint64_t row, std::size_t first) {
-  if (array.columns() == 16) {
+Rigid3 poseOf(const std::shared_ptr<NpyArray>& array, std::uint64_t row, std::size_t first) {
+  const auto number = [&](std::size_t k) { return NpyArray::columnOf(array, k).number(row); };
+  if (array->columns() == 16) {
     Eigen::Matrix4d matrix;
-    for (int k = 0; k < 16; ++k) {
-      matrix(k / 4, k % 4) = array.number(row, static_cast<std::size_t>(k));
-    }
+    for (int k = 0; k < 16; ++k) matrix(k / 4, k % 4) = number(static_cast<std::size_t>(k));
     if (matrix.allFinite()) return poseFromMatrix(matrix);
   } else {
     std::array<double, 7> values{};
     bool finite = true;
     for (std::size_t k = 0; k < values.size(); ++k) {
-      values[k] = array.number(row, first + k);
+      values[k] = number(first + k);
       finite = finite && std::isfinite(values[k]);
     }
     if (finite) return poseFromVector(values);
@@ -169,7 +167,7 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
           row, fmt::format("t = {}: expected {}", times.number(row), kExpectedTime));
     }
     try {
-      result.push_back({*t_ns, poseOf(poses, row, arrays.times ? 0 : 1)});
+      result.push_back({*t_ns, poseOf(arrays.poses, row, arrays.times ? 0 : 1)});
     } catch (const std::runtime_error& error) {
       throw poses.failAt(row, error.what());
     }

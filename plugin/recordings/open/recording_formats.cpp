@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cctype>
 #include <exception>
-#include <fstream>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -301,8 +300,8 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"evimo2", "a folder of EVIMO2 (dataset_events_t.npy and others)", looksLikeEvimo2,
        openEvimo2},
       {"numpy", "events in NumPy arrays (.npy, .npz)", looksLikeNumpy, openEventArrays},
-      {"text", "a text file with a line t x y p per event, also compressed", looksLikeEventText,
-       openEventText},
+      {"text", "a text file with a line t x y p per event, also compressed",
+       [](const fs::path& file) { return looksLikeEventText(file); }, openEventText},
   };
   return all;
 }

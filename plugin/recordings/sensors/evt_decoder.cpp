@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cstring>
 
-namespace efm::evt {
+namespace efm {
+namespace evt {
+namespace {
 
-inline constexpr std::uint64_t kNsPerUs = 1000;
+constexpr std::uint64_t kNsPerUs = 1000;
 
 /// The upper four bits of a word.
 enum EvtType : unsigned {
@@ -196,13 +198,6 @@ struct Evt3Code {
     return at;
   }
 };
-
-}  // namespace efm::evt
-
-namespace efm {
-
-namespace evt {
-namespace {
 
 /// Room for the events of many words, and for those that a vector writes behind its last.
 constexpr std::size_t kScratchEvents = 4096;

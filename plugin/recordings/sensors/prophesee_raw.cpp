@@ -11,7 +11,6 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "mapping/base/text.h"
@@ -68,7 +67,6 @@ class RawHeaderParser {
       : file_(file), text_(text) {}
 
   RawHeader parse() {
-    RawHeader header;
     while (nextLine()) {
       const std::size_t blank = line_.find(' ');
       const std::string_view key = line_.substr(0, blank);
@@ -76,40 +74,39 @@ class RawHeaderParser {
           blank == std::string_view::npos ? std::string_view() : trimmed(line_.substr(blank));
       if (key == "end") break;
       if (key == "evt") takeEncoding(key, value, "2.0, 2.1 or 3.0");
-      if (key == "format") takeFormat(value, header);
-      if (key == "geometry") takeGeometry(value, header);
+      if (key == "format") takeFormat(value);
+      if (key == "geometry") takeGeometry(value);
       if (key == "endianness") takeOrder(value);
       if (!camera_size_) camera_size_ = sizeOfCamera(key, value);
     }
-    if (!header.size) header.size = camera_size_;
+    if (!header_.size) header_.size = camera_size_;
     if (!encoding_) {
       throw std::runtime_error(
           fmt::format("{}: no encoding: expected a RAW file with a line '% evt 3.0', 2.0 or 2.1 in "
                       "its header",
                       file_.string()));
     }
-    header.encoding =
+    header_.encoding =
         *encoding_ == EvtEncoding::kEvt21 && legacy_order_ ? EvtEncoding::kEvt21Legacy : *encoding_;
-    header.bytes = at_;
-    return header;
+    return header_;
   }
 
  private:
   /// A line of a header begins with "% " and is text; words of events that begin so are neither.
   bool nextLine() {
-    if (text_.substr(at_, 2) != "% ") return false;
-    const std::size_t newline = text_.find('\n', at_);
+    if (text_.substr(header_.bytes, 2) != "% ") return false;
+    const std::size_t newline = text_.find('\n', header_.bytes);
     if (newline == std::string_view::npos) return false;
-    line_ = trimmed(text_.substr(at_ + 2, newline - at_ - 2));
+    line_ = trimmed(text_.substr(header_.bytes + 2, newline - header_.bytes - 2));
     const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 && c != '\t'; };
     if (std::any_of(line_.begin(), line_.end(), is_control)) return false;
-    at_ = newline + 1;
+    header_.bytes = newline + 1;
     ++number_;
     return true;
   }
 
   /// "EVT3;height=720;width=1280"
-  void takeFormat(std::string_view value, RawHeader& header) {
+  void takeFormat(std::string_view value) {
     const std::vector<std::string_view> parts = splitWords(value, ";");
     takeEncoding("format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
     CameraSize size;
@@ -125,13 +122,12 @@ class RawHeaderParser {
         (key == "width" ? size.width : size.height) = side;
       }
     }
-    if (size.width > 0 && size.height > 0) header.size = size;
+    if (size.width > 0 && size.height > 0) header_.size = size;
   }
 
-  void takeGeometry(std::string_view value, RawHeader& header) {
-    const std::optional<CameraSize> size = cameraSizeOf(value);
-    if (!size) throw fail("geometry", value, "WIDTHxHEIGHT in pixels");
-    header.size = size;
+  void takeGeometry(std::string_view value) {
+    header_.size = cameraSizeOf(value);
+    if (!header_.size) throw fail("geometry", value, "WIDTHxHEIGHT in pixels");
   }
 
   void takeOrder(std::string_view value) {
@@ -165,7 +161,7 @@ class RawHeaderParser {
 
   const std::filesystem::path& file_;
   std::string_view text_;
-  std::size_t at_ = 0;
+  RawHeader header_;
   std::string_view line_;
   int number_ = 0;
   std::optional<EvtEncoding> encoding_;

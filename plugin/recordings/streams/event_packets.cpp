@@ -67,7 +67,9 @@ void EventPackets::readAhead() {
     events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
     first_ = 0;
     readBlock();
-    sortEvents();
+    if (!std::exchange(disordered_, false)) continue;
+    std::stable_sort(events_.begin(), events_.end(),
+                     [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
   }
 }
 
@@ -201,13 +203,6 @@ void EventPackets::settleAhead(std::int64_t next_ns) {
 void EventPackets::refuse(const std::string& problem) {
   if (bad_ == nullptr) throw std::runtime_error(problem);
   bad_->skip(problem);
-}
-
-void EventPackets::sortEvents() {
-  if (!disordered_) return;
-  std::stable_sort(events_.begin(), events_.end(),
-                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
-  disordered_ = false;
 }
 
 }  // namespace efm

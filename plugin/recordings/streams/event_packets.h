@@ -69,7 +69,6 @@ class EventPackets {
   void refuse(const std::string& problem);
   bool isGood(const Event& event) const;
   std::string problemOf(std::size_t i) const;
-  void sortEvents();
 
   std::unique_ptr<EventStream> stream_;
   CameraSize size_;

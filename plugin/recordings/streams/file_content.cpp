@@ -81,7 +81,7 @@ bool isCompressed(const std::filesystem::path& file) {
   return false;
 }
 
-FileContent::FileContent(std::filesystem::path file, const std::string& member)
+FileContent::FileContent(std::filesystem::path file, [[maybe_unused]] const std::string& member)
     : file_(std::move(file)) {
   std::error_code error;
   if (isCompressed(file_)) {
@@ -102,8 +102,6 @@ FileContent::FileContent(std::filesystem::path file, const std::string& member)
       throw failure("several files in it: expected one");
     }
     member_ = member;
-#else
-    static_cast<void>(member);
 #endif
   } else {
     plain_.open(file_, std::ios::binary);
@@ -115,14 +113,9 @@ FileContent::FileContent(std::filesystem::path file, const std::string& member)
   if (error) bytes_ = 0;  // a pipe
 }
 
-FileContent::~FileContent() = default;
-FileContent::FileContent(FileContent&&) noexcept = default;
-
-void FileContent::CloseArchive::operator()(archive* opened) const {
+void FileContent::CloseArchive::operator()([[maybe_unused]] archive* opened) const {
 #ifdef EFM_WITH_ARCHIVES
   archive_read_free(opened);
-#else
-  static_cast<void>(opened);
 #endif
 }
 

@@ -25,9 +25,6 @@ class FileContent {
   /// @throws std::runtime_error if the file cannot be opened, has no such member or several, or
   /// this build does not read archives (EFM_READ_ARCHIVES).
   explicit FileContent(std::filesystem::path file, const std::string& member = {});
-  ~FileContent();
-  FileContent(FileContent&&) noexcept;
-  FileContent& operator=(FileContent&&) = delete;
 
   /// @return the number of bytes read: fewer than `count` only at the end.
   std::size_t read(char* to, std::size_t count);

@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/picture_file.h"
@@ -32,6 +31,29 @@ std::size_t countCameras(const fs::path& folder) {
   std::size_t count = 0;
   while (isFile(eventsOf(folder, count))) ++count;
   return count;
+}
+
+/// The size of the first existing image of images.txt.
+std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
+  std::ifstream list(folder / "images.txt");
+  std::string line;
+  while (std::getline(list, line)) {
+    std::istringstream fields(line);
+    std::string time;
+    std::string name;
+    if (!(fields >> time >> name) || time[0] == '#') continue;
+    const fs::path file = folder / name;
+    std::error_code ignored;
+    if (!fs::is_regular_file(file, ignored)) continue;
+    try {
+      const cv::Size size = pictureSize(readBytes(file));
+      return CameraSize{size.width, size.height};
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(file.string() + ": cannot be read as an image: " + error.what() +
+                               ", as large as the sensor");
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -66,7 +88,7 @@ void addFolderFiles(const fs::path& folder, const ReaderOptions& options, Record
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
     std::error_code ignored;
     if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
-    parts.poses = requirePoseText(folder / name, options);
+    parts.poses = requirePoses(readPoseText(folder / name, options), folder / name);
   }
 }
 
@@ -88,48 +110,6 @@ std::vector<TruthDepth> truthOfFolder(const fs::path& folder) {
   return truth;
 }
 
-namespace {
-
-constexpr CameraSize kDavis240c = {240, 180};
-
-/// The size of the first existing image of images.txt.
-std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
-  std::ifstream list(folder / "images.txt");
-  std::string line;
-  while (std::getline(list, line)) {
-    std::istringstream fields(line);
-    std::string time;
-    std::string name;
-    if (!(fields >> time >> name) || time[0] == '#') continue;
-    const fs::path file = folder / name;
-    std::error_code ignored;
-    if (!fs::is_regular_file(file, ignored)) continue;
-    try {
-      const cv::Size size = pictureSize(readBytes(file));
-      return CameraSize{size.width, size.height};
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(file.string() + ": cannot be read as an image: " + error.what() +
-                               ", as large as the sensor");
-    }
-  }
-  return std::nullopt;
-}
-
-/// The events, with the size of the images.
-class UzhEvents : public EventTextStream {
- public:
-  UzhEvents(const fs::path& folder, const ReaderOptions& options)
-      : EventTextStream(eventFileIn(folder), options), size_(sizeOfImages(folder)) {}
-  std::optional<CameraSize> size() const override {
-    return size_ ? size_ : EventTextStream::size();
-  }
-
- private:
-  std::optional<CameraSize> size_;
-};
-
-}  // namespace
-
 bool looksLikeUzhFolder(const fs::path& folder) { return isFile(eventFileIn(folder)); }
 
 RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderOptions& options) {
@@ -137,20 +117,19 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
   RecordingParts parts;
   parts.expected_calibration = "calib.txt";
   parts.expected_poses = "groundtruth.txt";
-  parts.default_size = kDavis240c;
-  parts.cameras.push_back(std::make_unique<UzhEvents>(folder, options));
+  parts.default_size = CameraSize{240, 180};  // the whole dataset was recorded with a DAVIS240C
+  auto events = std::make_unique<EventTextStream>(eventFileIn(folder), options);
+  if (const auto size = sizeOfImages(folder)) events->setSize(*size);
+  parts.cameras.push_back(std::move(events));
   std::error_code ignored;
   if (fs::exists(folder / "calib.txt", ignored)) {
     parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
   if (fs::exists(folder / "groundtruth.txt", ignored)) {
-    parts.poses = requirePoseText(folder / "groundtruth.txt", options);
+    parts.poses =
+        requirePoses(readPoseText(folder / "groundtruth.txt", options), folder / "groundtruth.txt");
   }
   return parts;
-}
-
-CameraSize uzhSensorSize(const fs::path& folder) {
-  return sizeOfImages(folder).value_or(kDavis240c);
 }
 
 }  // namespace efm

@@ -14,7 +14,8 @@ namespace efm {
 ///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
 ///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
-/// Other files are ignored, but events of a further camera than those of camchain.yaml are an error.
+/// Other files are ignored, but events of a further camera than those of camchain.yaml are an
+/// error.
 
 /// Whether the folder has a camchain.yaml, or events in cam0.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
@@ -35,7 +36,7 @@ std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
 ///   events.txt        t x y p; other names and columns: `eventFileIn`, `findEventColumns`
 ///   groundtruth.txt   t px py pz qx qy qz qw, T_world_cam
 ///   calib.txt         fx fy cx cy k1 k2 p1 p2 k3
-///   images.txt        t file, optional: the size of an image is the sensor's.
+///   images.txt        t file, optional: the size of the first existing image is the sensor's.
 
 /// Whether the folder has events.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
@@ -43,9 +44,5 @@ bool looksLikeUzhFolder(const std::filesystem::path& folder);
 /// @throws std::runtime_error naming the file (and line) that is missing or wrong.
 RecordingParts openUzhFolder(const std::vector<std::filesystem::path>& folders,
                              const ReaderOptions& options);
-
-/// The size of the first existing image of images.txt. Without one 240x180: the whole dataset was
-/// recorded with a DAVIS240C.
-CameraSize uzhSensorSize(const std::filesystem::path& folder);
 
 }  // namespace efm

@@ -178,11 +178,16 @@ void EventTextStream::takeLines(const char* begin, const char* end, std::vector<
 void EventTextStream::takeLine(std::string_view line, bool unterminated,
                                std::vector<Event>& events) {
   const bool header = first_byte_ == 0 && line_ <= columns_.header_lines;
-  if (const auto event = header ? std::nullopt : parseOrSkip(line, unterminated)) {
-    events.push_back(*event);
-  } else {
-    lines_.emplace_back(events.size(), line_ + 1);
+  try {
+    if (const auto event = header ? std::nullopt : parseLine(line, unterminated)) {
+      events.push_back(*event);
+      return;
+    }
+  } catch (const std::runtime_error& error) {
+    if (bad_ == nullptr) throw;
+    bad_->skip(error.what());
   }
+  lines_.emplace_back(events.size(), line_ + 1);
 }
 
 /// The fast path for a plain line. Each step stops at the newline at the latest.
@@ -259,17 +264,6 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   return event;
 }
 
-/// The event of a line; nothing where it has none, or a bad one that is left out.
-std::optional<Event> EventTextStream::parseOrSkip(std::string_view line, bool unterminated) {
-  try {
-    return parseLine(line, unterminated);
-  } catch (const std::runtime_error& error) {
-    if (bad_ == nullptr) throw;
-    bad_->skip(error.what());
-    return std::nullopt;
-  }
-}
-
 /// The first event of the lines that begin after a byte: the byte of its line, and its time.
 /// Nothing if the next bytes have none.
 std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEventAfter(
@@ -338,10 +332,6 @@ std::string beginningOfText(const std::filesystem::path& file) {
   const std::string_view text = withoutByteOrderMark(bytes);
   requireTextLines(text, file.string());
   return std::string(wholeLines(text, bytes.size() < kBytes));
-}
-
-bool looksLikeEventText(const std::filesystem::path& file) {
-  return looksLikeEventText(file, ReaderOptions());
 }
 
 bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options) {

@@ -30,16 +30,16 @@ class EventTextStream : public EventStream {
   std::string positionOf(std::size_t index) const override;
   std::string name() const override { return content_.file().string(); }
   double progress() const override { return started_ ? content_.progress() : 0; }
-  /// Of a first line `width height`.
+  /// Of a first line `width height`, or `setSize`.
   std::optional<CameraSize> size() const override { return columns_.size; }
   std::vector<Warning> warnings() const override { return columns_.warnings; }
+  void setSize(const CameraSize& size) { columns_.size = size; }
 
  private:
   void takeLines(const char* begin, const char* end, std::vector<Event>& events);
   void takeLine(std::string_view line, bool unterminated, std::vector<Event>& events);
   const char* parsePlainLine(const char* text, Event& event) const;
   std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
-  std::optional<Event> parseOrSkip(std::string_view line, bool unterminated);
   std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
   std::string place(std::uint64_t line) const;
 
@@ -59,10 +59,9 @@ class EventTextStream : public EventStream {
   std::vector<std::pair<std::size_t, std::uint64_t>> lines_;
 };
 
-/// Whether a file, which may be compressed, has lines of events. Never throws.
-bool looksLikeEventText(const std::filesystem::path& file);
-/// The same of the columns that an option names.
-bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options);
+/// Whether a file, which may be compressed, has lines of events, in the columns that the option
+/// names. Never throws.
+bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options = {});
 
 /// The whole lines at the beginning of a text, which may be compressed.
 std::string beginningOfText(const std::filesystem::path& file);

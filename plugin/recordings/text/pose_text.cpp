@@ -225,9 +225,4 @@ std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
                            ": no poses: expected at least one line t tx ty tz qx qy qz qw");
 }
 
-std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
-                                         const ReaderOptions& options) {
-  return requirePoses(readPoseText(file, options), file);
-}
-
 }  // namespace efm

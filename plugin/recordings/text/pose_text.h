@@ -34,9 +34,4 @@ bool looksLikePoseLines(std::string_view beginning);
 std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
                                       const std::filesystem::path& file);
 
-/// The same for the poses of a recording: at least one.
-/// @throws std::runtime_error if the file has no pose.
-std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
-                                         const ReaderOptions& options);
-
 }  // namespace efm

@@ -133,16 +133,15 @@ class Hdf5Camera {
         index_(file_.get(), "ms_to_idx", H5T_STD_U64LE) {}
 
   void add(const Event& event) {
-    constexpr std::int64_t kMicrosecondNs = 1'000;
     constexpr std::int64_t kMillisecondUs = 1'000;
     const auto fail = [&](const char* expected) {
       return std::runtime_error(fmt::format("event {} at {} s: expected {}", events_,
                                             formatSeconds(event.t_ns), expected));
     };
-    if (event.t_ns % kMicrosecondNs != 0) {
+    if (event.t_ns % kNanosecondsPerMicrosecond != 0) {
       throw fail("a time in whole microseconds, which is what DSEC's layout can hold");
     }
-    const std::int64_t t_us = event.t_ns / kMicrosecondNs;
+    const std::int64_t t_us = event.t_ns / kNanosecondsPerMicrosecond;
     if (!first_us_) first_us_ = t_us;
     const std::int64_t since_us = t_us - *first_us_;
     if (since_us < 0 || since_us > std::numeric_limits<std::uint32_t>::max()) {

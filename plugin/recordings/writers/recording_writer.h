@@ -65,10 +65,7 @@ class RecordingWriter {
   virtual void addPose(const StampedPose& pose) = 0;
   /// Adds a depth map of camera 0: a float32 TIFF file in metres. Most formats have no place for
   /// it.
-  virtual void addTruth(std::int64_t t_ns, const std::filesystem::path& file) {
-    static_cast<void>(t_ns);
-    static_cast<void>(file);
-  }
+  virtual void addTruth(std::int64_t /*t_ns*/, const std::filesystem::path& /*file*/) {}
   /// Completes the files.
   virtual void close() = 0;
 };

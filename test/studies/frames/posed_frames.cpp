@@ -59,8 +59,14 @@ PosedFrame FrameUndistortion::operator()(const cv::Mat1f& raw) const {
   return frame;
 }
 
+CameraModel uzhCamera(const fs::path& folder) {
+  const RecordingParts parts = openUzhFolder({folder}, {});
+  const CameraSize size = parts.cameras[0]->size().value_or(*parts.default_size);
+  return parts.calibration.value().camera(0, size).model;
+}
+
 PosedFrames readUzhFrames(const fs::path& folder) {
-  const CameraModel camera = readUzhCalibration(folder / "calib.txt", uzhSensorSize(folder));
+  const CameraModel camera = uzhCamera(folder);
   Trajectory trajectory;
   for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) trajectory.add(pose);
 

@@ -42,6 +42,9 @@ class FrameUndistortion {
   cv::Mat2f source_;  // per pixel of the view: the raw pixel
 };
 
+/// The camera of a folder in the UZH layout.
+CameraModel uzhCamera(const std::filesystem::path& folder);
+
 /// The frames with a pose of a folder in the UZH layout (images.txt: a line `t file` per image).
 /// @throws std::runtime_error naming the missing or invalid file (and line).
 PosedFrames readUzhFrames(const std::filesystem::path& folder);

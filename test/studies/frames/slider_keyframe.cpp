@@ -7,20 +7,21 @@
 
 #include "mapping/keyframes/keyframe_policy.h"
 #include "plugin/recordings/streams/event_packets.h"
-#include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
+#include "test/studies/frames/posed_frames.h"
 
 namespace efm::studies {
 
 SliderRecording readSlider(const std::filesystem::path& folder) {
   SliderRecording recording;
-  const CameraSize size = uzhSensorSize(folder);
-  recording.rig.cameras.push_back({readUzhCalibration(folder / "calib.txt", size), {}, 0});
+  const CameraModel camera = uzhCamera(folder);
+  recording.rig.cameras.push_back({camera, {}, 0});
   for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) {
     recording.trajectory.add(pose);
   }
   const std::int64_t first_pose_ns = recording.trajectory.poses().front().t_ns;
-  EventPackets reader(std::make_unique<EventTextStream>(folder / "events.txt"), size);
+  EventPackets reader(std::make_unique<EventTextStream>(folder / "events.txt"),
+                      {camera.width, camera.height});
   for (auto packet = reader.nextPacket(); !packet.empty(); packet = reader.nextPacket()) {
     for (const Event& event : packet) {
       if (event.t_ns >= first_pose_ns) recording.events.push_back(event);

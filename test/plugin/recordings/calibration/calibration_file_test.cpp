@@ -44,7 +44,6 @@ TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
   CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};
   expected.coefficients = {0.1, 0, 0, 0, 0};
   EXPECT_EQ(calibration.camera(0, CameraSize{240, 180}).model, expected);
-  EXPECT_EQ(readUzhCalibration(folder() / "given.txt", {240, 180}), expected);
   expected.coefficients[0] = 0;
   EXPECT_EQ(read("200 201 120 90 0 0 0 0 0").camera(0, CameraSize{240, 180}).model, expected);
   EXPECT_THAT(messageOf([&] { calibration.camera(0, std::nullopt); }),

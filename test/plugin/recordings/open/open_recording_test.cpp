@@ -330,7 +330,8 @@ class UzhText : public TextFolder {
     write("calib.txt", "200 201 120 90 0 0 0 0 0\n");
   }
   std::string sizeFound() const {
-    const CameraSize size = uzhSensorSize(folder());
+    const RecordingParts parts = openUzhFolder({folder()}, {});
+    const CameraSize size = parts.cameras[0]->size().value_or(*parts.default_size);
     return std::to_string(size.width) + "x" + std::to_string(size.height);
   }
 };
