@@ -18,8 +18,7 @@ LoopMotion::LoopMotion(const LoopMotionOptions& options) : options_(options) {
 }
 
 Rigid3 LoopMotion::poseAt(std::int64_t t_ns) const {
-  constexpr double kTwoPi = 6.283185307179586476925;
-  const double phase = kTwoPi * secondsBetween(options_.start_ns, t_ns) / options_.period_s;
+  const double phase = 2 * kPi * secondsBetween(options_.start_ns, t_ns) / options_.period_s;
   Eigen::Matrix3d R_outward_cam;  // outward: x out, y left, z up
   R_outward_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   Rigid3 T_world_cam;
@@ -32,12 +31,10 @@ Rigid3 LoopMotion::poseAt(std::int64_t t_ns) const {
 
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586476925;
-
 double valueAt(const std::vector<Sine>& sines, double t_s) {
   double sum = 0;
   for (const Sine& sine : sines) {
-    sum += sine.amplitude * std::sin(kTwoPi * sine.frequency_hz * t_s + sine.phase_rad);
+    sum += sine.amplitude * std::sin(2 * kPi * sine.frequency_hz * t_s + sine.phase_rad);
   }
   return sum;
 }
@@ -112,13 +109,14 @@ Poses withoutJumps(const Poses& poses) {
   return kept;
 }
 
-void refuseGaps(const Poses& poses, double max_gap_s) {
+void refuseGaps(const Poses& poses) {
+  constexpr double kMaxGapS = 1;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const double gap_s = secondsBetween(poses[i - 1].t_ns, poses[i].t_ns);
-    if (gap_s <= max_gap_s) continue;
+    if (gap_s <= kMaxGapS) continue;
     throw std::invalid_argument("no pose for " + std::to_string(gap_s) + " s after t = " +
                                 formatSeconds(poses[i - 1].t_ns) + ": a gap of at most " +
-                                std::to_string(max_gap_s) + " s can be bridged");
+                                std::to_string(kMaxGapS) + " s can be bridged");
   }
 }
 
@@ -207,21 +205,13 @@ Poses filtered(const Poses& poses, const std::vector<double>& weights) {
 
 }  // namespace
 
-void SmoothingOptions::validate() const {
-  requireOption(cutoff_hz > 0 && std::isfinite(cutoff_hz), "cutoff_hz", cutoff_hz, "above 0");
-  requireOption(period_ns > 0 && secondsBetween(0, period_ns) * cutoff_hz <= 0.25, "period_ns",
-                period_ns, "above 0 and at most a quarter of 1 / cutoff_hz");
-  requireOption(max_gap_s > 0, "max_gap_s", max_gap_s, "above 0");
-}
-
-std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
-                                          const SmoothingOptions& options) {
-  options.validate();
+std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses) {
+  constexpr std::int64_t kPeriodNs = 5'000'000;
   const Poses clean = withoutJumps(inOrder(poses));
-  refuseGaps(clean, options.max_gap_s);
-  const double cutoff_hz = std::min(options.cutoff_hz, 0.4 / medianPeriod(clean));
-  return filtered(resampled(clean, options.period_ns),
-                  lowPass(cutoff_hz, secondsBetween(0, options.period_ns)));
+  refuseGaps(clean);
+  // Above half of the poses' rate there are only artefacts of interpolation.
+  const double cutoff_hz = std::min(10.0, 0.4 / medianPeriod(clean));
+  return filtered(resampled(clean, kPeriodNs), lowPass(cutoff_hz, secondsBetween(0, kPeriodNs)));
 }
 
 std::int64_t startOfMotion(const std::vector<StampedPose>& poses) {

@@ -68,22 +68,12 @@ class SmoothMotion : public Motion {
   SmoothMotionOptions options_;
 };
 
-struct SmoothingOptions {
-  /// Cutoff frequency of the low-pass filter, Hz, above 0. At most 0.4 times the rate of the poses
-  /// is used: above half of that rate there are only artefacts of interpolation.
-  double cutoff_hz = 10;
-  std::int64_t period_ns = 5'000'000;  ///< Of the result; at most a quarter of 1 / cutoff.
-  double max_gap_s = 1;                ///< Longer gaps are errors.
-
-  void validate() const;
-};
-
 /// Smooths measured poses. A single pose that jumps is removed: its distance from the line between
-/// its neighbours is over 8 times the median. The others are resampled evenly, also across gaps,
-/// and filtered without delay by a windowed sinc: positions, and rotations in the tangent space at
-/// each sample. Poses may be in any order; of equal times the first counts.
-std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
-                                          const SmoothingOptions& options = {});
+/// its neighbours is over 8 times the median. The others are resampled every 5 ms, also across gaps
+/// of up to 1 s, and filtered without delay by a windowed sinc, low-pass at 10 Hz: positions, and
+/// rotations in the tangent space at each sample. Poses may be in any order; of equal times the
+/// first counts.
+std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses);
 
 /// The first time from which a recording moves, over half a second, with at least half of its mean
 /// speed. The time of the first pose where it never moves.

@@ -5,8 +5,6 @@
 #include <memory>
 #include <string_view>
 
-#include "mapping/base/named_choice.h"
-#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/furnishing.h"
@@ -370,18 +368,6 @@ constexpr NamedChoice<MakePreset> kPresets[] = {
 
 }  // namespace
 
-void SimulationOptions::validate() const {
-  try {
-    valueIn(kPresets, preset);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(std::string("preset: ") + error.what());
-  }
-  if (duration_s) {
-    requireOption(*duration_s >= 0.001 && *duration_s <= 600, "duration_s", *duration_s,
-                  "0.001 to 600");
-  }
-}
-
 std::vector<std::string> simulationPresets() {
   std::vector<std::string> names;
   for (const auto& preset : kPresets) names.emplace_back(preset.name);
@@ -389,8 +375,8 @@ std::vector<std::string> simulationPresets() {
 }
 
 Simulation makeSimulation(const SimulationOptions& options) {
-  options.validate();
-  Simulation simulation = valueIn(kPresets, options.preset)(options.seed);
+  Simulation simulation =
+      makerIn(kPresets, "preset", options.preset, options.duration_s)(options.seed);
   if (options.duration_s) simulation.duration_ns = durationFromSeconds(*options.duration_s);
   return simulation;
 }

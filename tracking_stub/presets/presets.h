@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/trajectory.h"
@@ -36,6 +40,24 @@ inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   return rig;
 }
 
+/// The function with the name that an option has. Also checks the duration.
+template <typename Make, std::size_t N>
+Make makerIn(const NamedChoice<Make> (&makers)[N], const std::string& option,
+             const std::string& name, const std::optional<double>& duration_s) {
+  const Make maker = [&] {
+    try {
+      return valueIn(makers, name);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(option + ": " + error.what());
+    }
+  }();
+  if (duration_s) {
+    requireOption(*duration_s >= 0.001 && *duration_s <= 600, "duration_s", *duration_s,
+                  "0.001 to 600");
+  }
+  return maker;
+}
+
 /// The presets: simulations that are ready to run. Each starts at t = 1 s. README.md has a table of
 /// their cameras, durations and depths.
 
@@ -45,8 +67,6 @@ struct SimulationOptions {
   std::optional<double> duration_s = std::nullopt;
   /// Seed of everything random: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
-
-  void validate() const;
 };
 
 std::vector<std::string> simulationPresets();
@@ -65,8 +85,6 @@ struct TrajectorySimulationOptions {
   /// Seconds, 0.001 to 600. Default: 5, or less where the trajectory ends earlier.
   std::optional<double> duration_s = std::nullopt;
   std::uint64_t seed = 1;
-
-  void validate() const;
 };
 
 /// The names of the scenes that can be built around a trajectory.

@@ -5,11 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
-#include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/scenes.h"
@@ -142,18 +139,6 @@ std::vector<StampedPose> posesAround(const std::vector<StampedPose>& poses, std:
 
 }  // namespace
 
-void TrajectorySimulationOptions::validate() const {
-  try {
-    valueIn(kScenes, scene);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(std::string("scene: ") + error.what());
-  }
-  if (duration_s) {
-    requireOption(*duration_s >= 0.001 && *duration_s <= 600, "duration_s", *duration_s,
-                  "0.001 to 600");
-  }
-}
-
 std::vector<std::string> simulationScenes() {
   std::vector<std::string> names;
   for (const auto& scene : kScenes) names.emplace_back(scene.name);
@@ -163,7 +148,7 @@ std::vector<std::string> simulationScenes() {
 Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                                     const std::vector<StampedPose>& measured, const Rig& rig) {
   constexpr double kDurationS = 5;
-  options.validate();
+  const MakeScene make = makerIn(kScenes, "scene", options.scene, options.duration_s);
   requireOption(measured.size() >= 2, "poses", measured.size(), "at least 2");
   std::vector<StampedPose> poses = measured;
   std::stable_sort(poses.begin(), poses.end(),
@@ -190,7 +175,7 @@ Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
     simulation.truth_cell_m = 0.05;
     simulation.max_step_px = 1;
   }
-  simulation.scene = valueIn(kScenes, options.scene)(pathOf(simulation));
+  simulation.scene = make(pathOf(simulation));
   return simulation;
 }
 

@@ -115,8 +115,7 @@ ViewHit SceneView::cast(const Eigen::Vector2d& ray) const {
 
 SurfacePoint SceneView::surfacePointOf(const ViewHit& hit, const Eigen::Vector2d& ray) const {
   if (hit.surface < 0) return {};
-  const Facet& f =
-      facets_[static_cast<std::size_t>(facet_of_[static_cast<std::size_t>(hit.surface)])];
+  const Facet& f = facetOf(hit);
   return {hit.surface, static_cast<float>(at(f.u_over_depth, ray) / hit.inverse_depth),
           static_cast<float>(at(f.v_over_depth, ray) / hit.inverse_depth)};
 }
@@ -124,8 +123,7 @@ SurfacePoint SceneView::surfacePointOf(const ViewHit& hit, const Eigen::Vector2d
 float SceneView::logIntensity(const ViewHit& hit, const Eigen::Vector2d& ray,
                               double pixel_pitch) const {
   if (hit.surface < 0) return 0;
-  const Facet& f =
-      facets_[static_cast<std::size_t>(facet_of_[static_cast<std::size_t>(hit.surface)])];
+  const Facet& f = facetOf(hit);
   const double depth = 1 / hit.inverse_depth;
   const double u = at(f.u_over_depth, ray) * depth;
   const double v = at(f.v_over_depth, ray) * depth;
@@ -182,7 +180,6 @@ PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(mo
 
 namespace {
 
-constexpr int kRowsPerTask = 8;
 constexpr int kSamples = 16;
 
 /// Hammersley's points. No two have the same row or column: an edge of any orientation covers a
@@ -215,7 +212,7 @@ bool isSilhouette(const cv::Mat1i& surface, int x, int y) {
 
 template <typename RowTask>
 void forEachRow(int rows, const RowTask& task) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows, kRowsPerTask),
+  tbb::parallel_for(tbb::blocked_range<int>(0, rows, 8),
                     [&task](const tbb::blocked_range<int>& range) {
                       for (int y = range.begin(); y < range.end(); ++y) task(y);
                     });

@@ -66,14 +66,16 @@ class SceneView {
   void fillTile(const Eigen::Vector2d& center, const Eigen::Vector2d& half_size,
                 std::vector<Candidate>& tile) const;
   const std::vector<Candidate>& tileOf(const Eigen::Vector2d& ray) const;
+  const Facet& facetOf(const ViewHit& hit) const {
+    return facets_[static_cast<std::size_t>(facet_of_[static_cast<std::size_t>(hit.surface)])];
+  }
 
   const Scene* scene_;
   RayBounds bounds_;
   Eigen::Vector2d tiles_per_ray_;
-  std::vector<Facet> facets_;  // the visible sides only
-  std::vector<int> facet_of_;  // per surface; -1
-  std::vector<std::vector<Candidate>>
-      tiles_;  // row-major; the last one is for rays outside of the bounds
+  std::vector<Facet> facets_;                  // the visible sides only
+  std::vector<int> facet_of_;                  // per surface; -1
+  std::vector<std::vector<Candidate>> tiles_;  // row-major; the last is for rays out of the bounds
 };
 
 /// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel. Not numbers

@@ -17,27 +17,18 @@ double Painting::texelFor(double nearest_m) const {
   return std::max(0.5 * nearest_m / options_.focal_px, options_.min_texel_m);
 }
 
-Scene::Painter Painting::clutter(double nearest_m, double feature_m, double contrast) {
-  return [this, nearest_m, feature_m, contrast](double width_m, double height_m) {
-    ClutterOptions options;
-    options.width_m = width_m;
-    options.height_m = height_m;
-    options.texel_m = texelFor(nearest_m);
-    options.feature_m = feature_m;
-    options.coverage = options_.coverage;
-    options.contrast = contrast;
-    options.seed = seed_++;
-    return paintClutter(options);
-  };
+namespace {
+
+int texelsAlong(double length_m, double texel_m) {
+  return std::max(4, static_cast<int>(std::ceil(length_m / texel_m)));
 }
+
+}  // namespace
 
 Scene::Painter Painting::rings(double nearest_m, double band_m, float tone, float contrast) const {
   const double texel_m = texelFor(nearest_m);
   return [texel_m, band_m, tone, contrast](double width_m, double height_m) {
-    const auto texels = [texel_m](double length_m) {
-      return std::max(4, static_cast<int>(std::ceil(length_m / texel_m)));
-    };
-    cv::Mat1f painting(texels(height_m), texels(width_m));
+    cv::Mat1f painting(texelsAlong(height_m, texel_m), texelsAlong(width_m, texel_m));
     for (int row = 0; row < painting.rows; ++row) {
       const bool second = static_cast<int>((row + 0.5) * texel_m / band_m) % 2 == 1;
       painting.row(row) = second ? tone - contrast : tone;
@@ -108,30 +99,32 @@ void fill(cv::Mat1f& canvas, const Polygon& polygon, const cv::Point2d& center_p
 
 }  // namespace
 
-Texture paintClutter(const ClutterOptions& options) {
-  RandomNumbers random(options.seed);
-  const int columns = std::max(4, static_cast<int>(std::ceil(options.width_m / options.texel_m)));
-  const int rows = std::max(4, static_cast<int>(std::ceil(options.height_m / options.texel_m)));
-  const double px_per_m = kOversampling / options.texel_m;
-  const double ground = random.uniform(-options.ground, options.ground);
-  cv::Mat1f canvas(rows * kOversampling, columns * kOversampling);
-  std::fill(canvas.begin(), canvas.end(), static_cast<float>(ground));
-  const double area = options.width_m * options.height_m;
-  const int shapes = static_cast<int>(
-      std::lround(options.coverage * area / (options.feature_m * options.feature_m)));
-  for (int i = 0; i < shapes; ++i) {
-    const double size = options.feature_m * random.uniform(0.6, 1.5);
-    const cv::Point2d center(random.uniform(0, canvas.cols), random.uniform(0, canvas.rows));
-    const double sign = random.below(2) == 0 ? -1 : 1;
-    const auto value =
-        static_cast<float>(ground + sign * options.contrast * random.uniform(0.45, 1.0));
-    for (const Polygon& polygon : drawShape(size, random)) {
-      fill(canvas, polygon, center, px_per_m, value);
+Scene::Painter Painting::clutter(double nearest_m, double feature_m, double contrast) {
+  return [this, nearest_m, feature_m, contrast](double width_m, double height_m) {
+    RandomNumbers random(seed_++);
+    const double texel_m = texelFor(nearest_m);
+    const int columns = texelsAlong(width_m, texel_m);
+    const int rows = texelsAlong(height_m, texel_m);
+    const double px_per_m = kOversampling / texel_m;
+    const double ground = random.uniform(-0.6, 0.6);  // surfaces differ: silhouettes are visible
+    cv::Mat1f canvas(rows * kOversampling, columns * kOversampling);
+    std::fill(canvas.begin(), canvas.end(), static_cast<float>(ground));
+    const double area = width_m * height_m;
+    const int shapes =
+        static_cast<int>(std::lround(options_.coverage * area / (feature_m * feature_m)));
+    for (int i = 0; i < shapes; ++i) {
+      const double size = feature_m * random.uniform(0.6, 1.5);
+      const cv::Point2d center(random.uniform(0, canvas.cols), random.uniform(0, canvas.rows));
+      const double sign = random.below(2) == 0 ? -1 : 1;
+      const auto value = static_cast<float>(ground + sign * contrast * random.uniform(0.45, 1.0));
+      for (const Polygon& polygon : drawShape(size, random)) {
+        fill(canvas, polygon, center, px_per_m, value);
+      }
     }
-  }
-  cv::Mat1f painting;
-  cv::resize(canvas, painting, {columns, rows}, 0, 0, cv::INTER_AREA);
-  return Texture(painting, options.texel_m);
+    cv::Mat1f painting;
+    cv::resize(canvas, painting, {columns, rows}, 0, 0, cv::INTER_AREA);
+    return Texture(painting, texel_m);
+  };
 }
 
 namespace {

@@ -26,9 +26,13 @@ class Painting {
   explicit Painting(const PaintingOptions& options)
       : options_(options), seed_(options.seed * 1000) {}
 
-  /// Paints clutter (see `ClutterOptions`).
-  /// @param nearest_m the shortest distance to a camera. It sets the texel.
-  /// @param feature_m size of the shapes.
+  /// Paints clutter: sharp blocks, triangles, polygons and bars of all orientations and many
+  /// contrasts on an even ground. Most edges are farther apart than the blur of a pixel, so events
+  /// gather on them.
+  /// @param nearest_m the shortest distance to a camera. A texel is half a pixel at this distance:
+  /// then the blur of the finest texture level is half a pixel.
+  /// @param feature_m mean size of a shape, and mean distance of shapes.
+  /// @param contrast max difference in log intensity between a shape and the ground.
   Scene::Painter clutter(double nearest_m, double feature_m, double contrast = 0.9);
 
   /// Paints rings around a pole, in two tones. All facets are equal.
@@ -41,26 +45,6 @@ class Painting {
   PaintingOptions options_;
   std::uint64_t seed_;
 };
-
-struct ClutterOptions {
-  double width_m = 1;
-  double height_m = 1;
-  /// Size of a texel. About half a pixel at the shortest distance: then the blur of the finest
-  /// texture level is half a pixel.
-  double texel_m = 0.002;
-  double feature_m = 0.1;  ///< Mean size of a shape, and mean distance of shapes.
-  double coverage = 0.5;   ///< Shapes per feature_m x feature_m.
-  double contrast = 0.9;   ///< Max difference in log intensity between a shape and the ground.
-  /// The ground's log intensity is random, from -ground to ground: surfaces differ, so silhouettes
-  /// are visible.
-  double ground = 0.6;
-  std::uint64_t seed = 0;
-};
-
-/// Paints clutter: sharp blocks, triangles, polygons and bars of all orientations and many
-/// contrasts on an even ground. Most edges are farther apart than the blur of a pixel, so events
-/// gather on them.
-Texture paintClutter(const ClutterOptions& options);
 
 /// Parts of rooms and streets. Frame `world`: z up.
 

@@ -97,22 +97,21 @@ void Scene::addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, con
 void Scene::addPole(const Pole& pole, const Painter& paint) {
   requireOption(pole.radius_m > 0, "radius_m", pole.radius_m, "above 0");
   requireOption(pole.length_m > 0, "length_m", pole.length_m, "above 0");
-  requireOption(pole.facets >= 4 && pole.facets % 2 == 0, "facets", pole.facets,
-                "even, at least 4");
-  const double half_angle = kPi / pole.facets;
+  constexpr int kFacets = 8;  // even: see the ends
+  const double half_angle = kPi / kFacets;
   const double width = 2 * pole.radius_m * std::sin(half_angle);
   const double apothem = pole.radius_m * std::cos(half_angle);
   const Eigen::Quaterniond& R_world_pole = pole.T_world_pole.rotation;
   const Eigen::Vector3d along = R_world_pole * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d foot = pole.T_world_pole.translation - 0.5 * pole.length_m * along;
-  for (int facet = 0; facet < pole.facets; ++facet) {
+  for (int facet = 0; facet < kFacets; ++facet) {
     const double angle = 2 * half_angle * facet;
     const Eigen::Vector3d outward =
         R_world_pole * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
     const Eigen::Vector3d around = along.cross(outward);
     const Eigen::Vector3d edge = -0.5 * width * around;
     addRectangle({foot + apothem * outward + edge, around, along, width, pole.length_m}, paint);
-    if (facet >= pole.facets / 2) continue;
+    if (facet >= kFacets / 2) continue;
     const Eigen::Vector3d across = -apothem * outward + edge;
     addRectangle({foot + pole.length_m * along + across, outward, around, 2 * apothem, width},
                  paint);

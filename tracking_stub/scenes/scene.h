@@ -57,12 +57,11 @@ struct SurfacePoint {
   float v_m = 0;
 };
 
-/// A prism: a thin pole, a lamp post or the leg of a table.
+/// A prism with eight sides: a thin pole, a lamp post or the leg of a table.
 struct Pole {
   Rigid3 T_world_pole;     ///< Frame `pole`: origin in the middle, z along the pole.
   double radius_m = 0.02;  ///< Distance of the corners from the axis, above 0.
   double length_m = 1;
-  int facets = 8;  ///< Even, at least 4.
 };
 
 /// Textured rectangles in the world.

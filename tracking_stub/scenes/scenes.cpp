@@ -48,6 +48,7 @@ void addFloorAndCeiling(Scene& scene, const RoomOptions& options, Painting& pain
 }
 
 constexpr double kBehindM = 6;  // from the start of the street to the path
+constexpr double kAheadM = 25;  // from the path to the house at the end, at least
 constexpr double kStreetPanelM = 5;
 constexpr double kClearanceM = 3;  // from the path to the nearest object
 constexpr double kFacadeM = 7;     // from the middle of the road to the houses
@@ -71,8 +72,7 @@ class MiddleLine {
     for (std::size_t i = 1; i < points_.size(); ++i)
       path_length += (points_[i] - points_[i - 1]).norm();
     points_.push_back(points_.back() +
-                      std::max(options.min_ahead_m, options.min_length_m - path_length) *
-                          last_step);
+                      std::max(kAheadM, options.min_length_m - path_length) * last_step);
     points_.insert(points_.begin(), points_.front() - kBehindM * first_step);
     for (std::size_t i = 1; i < points_.size(); ++i) {
       length_ += (points_[i] - points_[i - 1]).norm();

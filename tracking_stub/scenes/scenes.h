@@ -42,10 +42,9 @@ struct StreetOptions {
   /// The path of the vehicle: points in order, at least two different ones, at most metres apart.
   /// Frame `world`: z up, the road is at z = 0.
   std::vector<Eigen::Vector2d> path;
-  double min_length_m =
-      50;  ///< Min length from the first point of the path to the house at the end.
-  double min_ahead_m = 25;  ///< Min length from the last point of the path to that house.
-  double focal_px = 550;    ///< Longest focal length of the cameras.
+  /// Min length from the first point of the path to the house at the end.
+  double min_length_m = 50;
+  double focal_px = 550;  ///< Longest focal length of the cameras.
   std::uint64_t seed = 0;
 };
 

@@ -21,6 +21,15 @@ namespace {
 
 bool isRate(double hz) { return hz >= 0 && hz <= EventNoiseOptions::kMaxHz; }
 
+std::int64_t roundToMicroseconds(std::int64_t base_ns, double offset_ns) {
+  // Only the part below a microsecond is a double.
+  constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
+  const std::int64_t whole = base_ns / kNanosecondsPerMicrosecond;
+  const auto rest_ns = static_cast<double>(base_ns - whole * kNanosecondsPerMicrosecond);
+  return (whole + std::llround((rest_ns + offset_ns) / kNanosecondsPerMicrosecond)) *
+         kNanosecondsPerMicrosecond;
+}
+
 }  // namespace
 
 void EventNoiseOptions::validate() const {
@@ -69,19 +78,6 @@ void EventNoise::fireRow(int y, std::int64_t until_ns, std::vector<Event>& event
     }
   }
 }
-
-namespace {
-
-std::int64_t roundToMicroseconds(std::int64_t base_ns, double offset_ns) {
-  // Only the part below a microsecond is a double.
-  constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
-  const std::int64_t whole = base_ns / kNanosecondsPerMicrosecond;
-  const auto rest_ns = static_cast<double>(base_ns - whole * kNanosecondsPerMicrosecond);
-  return (whole + std::llround((rest_ns + offset_ns) / kNanosecondsPerMicrosecond)) *
-         kNanosecondsPerMicrosecond;
-}
-
-}  // namespace
 
 void EventPixelOptions::validate() const {
   requireOption(threshold_on >= kMinThreshold && std::isfinite(threshold_on), "threshold_on",

@@ -148,7 +148,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 std::string errorOf(const SimulationOptions& options) {
-  return messageOf([&] { options.validate(); });
+  return messageOf([&] { makeSimulation(options); });
 }
 
 TEST(SimulationPreset, AnUnknownNameIsAnErrorThatListsTheKnownOnes) {
@@ -156,7 +156,6 @@ TEST(SimulationPreset, AnUnknownNameIsAnErrorThatListsTheKnownOnes) {
   options.preset = "attic";
   EXPECT_THAT(errorOf(options),
               AllOf(HasSubstr("preset"), HasSubstr("'attic'"), HasSubstr("desk_stereo")));
-  EXPECT_THROW(makeSimulation(options), std::invalid_argument);
 }
 
 TEST(SimulationPreset, TheDurationIsCheckedAndUsed) {

@@ -62,9 +62,9 @@ TEST(Texture, RefusesAPaintingWithoutTexels) {
 }
 
 TEST(Clutter, HasEdgesOfAllOrientations) {
-  ClutterOptions options;
-  options.width_m = options.height_m = 2;
-  const Texture texture = paintClutter(options);
+  PaintingOptions options;
+  options.coverage = 0.5;
+  const Texture texture = Painting(options).clutter(0.9, 0.1)(2, 2);
   // Sum of gradients by direction, in bins of 22.5 degrees.
   std::array<double, 8> strength{};
   constexpr double kStep = 0.004;
@@ -107,7 +107,7 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
   Rigid3 T_world_pole;
   T_world_pole.translation = {1, 2, 3};
   T_world_pole.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized());
-  scene.addPole({T_world_pole, 0.1, 2, 8}, test::evenPaint(0));
+  scene.addPole({T_world_pole, 0.1, 2}, test::evenPaint(0));
   RandomNumbers random(3);
   const double apothem = 0.1 * std::cos(M_PI / 8);
   for (int i = 0; i < 500; ++i) {
@@ -132,9 +132,8 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
 
 TEST(Scene, RefusesAnInvalidPole) {
   Scene scene;
-  EXPECT_THROW(scene.addPole({{}, 0, 1, 8}, test::evenPaint(0)), std::invalid_argument);
-  EXPECT_THROW(scene.addPole({{}, 0.1, 0, 8}, test::evenPaint(0)), std::invalid_argument);
-  EXPECT_THROW(scene.addPole({{}, 0.1, 1, 7}, test::evenPaint(0)), std::invalid_argument);
+  EXPECT_THROW(scene.addPole({{}, 0, 1}, test::evenPaint(0)), std::invalid_argument);
+  EXPECT_THROW(scene.addPole({{}, 0.1, 0}, test::evenPaint(0)), std::invalid_argument);
 }
 
 TEST(Scene, MovesAllSurfaces) {
