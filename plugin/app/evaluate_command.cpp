@@ -192,7 +192,7 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
   refusePlotOver(arguments, arguments.options.mask);
   const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
   DepthEvaluationOptions options = arguments.options;
-  if (stereo) options.focal_baseline = stereo->focalBaseline();
+  if (stereo) options.focal_baseline = stereo->focal_px * stereo->baseline_m;
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
   return finish(arguments, evaluationTable(evaluation, stereo), evaluationJson(evaluation, stereo),
                 [&] { return evaluationPlot(evaluation, options); });

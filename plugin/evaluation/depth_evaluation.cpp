@@ -363,36 +363,6 @@ namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-/// Estimate, truth and error as images of values.
-struct ShownDepths {
-  cv::Mat1f estimate;
-  cv::Mat1f truth;
-  cv::Mat1f error;
-  std::vector<double> depths_m;  ///< Of the truth.
-  std::vector<double> errors_m;
-};
-
-ShownDepths shownDepths(const EvaluatedMap& map, const DepthEvaluationOptions& options) {
-  const ComparedDepths depths = readDepths(map, maskOf(options), options);
-  const cv::Size size = depths.truth.size();
-  ShownDepths shown{{size, kNone}, {size, kNone}, {size, kNone}, {}, {}};
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
-      if (depths.hasTruth(y, x, options.pairing)) {
-        shown.truth(y, x) = depths.truth(y, x);
-        shown.depths_m.push_back(depths.truth(y, x));
-      }
-      if (!depths.hasEstimate(y, x)) continue;
-      shown.estimate(y, x) = depths.estimate(y, x);
-      const double truth_m = bestTruth(depths, {x, y}, options.pairing);
-      if (!(truth_m > 0)) continue;
-      shown.error(y, x) = static_cast<float>(std::abs(depths.estimate(y, x) - truth_m));
-      shown.errors_m.push_back(shown.error(y, x));
-    }
-  }
-  return shown;
-}
-
 const EvaluatedMap& typicalMap(const DepthEvaluation& evaluation) {
   std::vector<const EvaluatedMap*> maps;
   for (const EvaluatedMap& map : evaluation.maps) maps.push_back(&map);
@@ -411,14 +381,31 @@ AxisRange usualRange(const std::vector<double>& values, AxisScale scale) {
 }
 
 cv::Mat3b depthImages(const EvaluatedMap& map, const DepthEvaluationOptions& options) {
-  const ShownDepths shown = shownDepths(map, options);
-  const AxisRange depths = usualRange(shown.depths_m, AxisScale::kLogarithmic);
-  double max_error_m = quantileOf(shown.errors_m, shown.errors_m.empty() ? 1 : 0.95);
+  const ComparedDepths depths = readDepths(map, maskOf(options), options);
+  const cv::Size size = depths.truth.size();
+  cv::Mat1f estimate(size, kNone), truth(size, kNone), error(size, kNone);
+  std::vector<double> depths_m, errors_m;  // of the truth, of the estimate
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (depths.hasTruth(y, x, options.pairing)) {
+        truth(y, x) = depths.truth(y, x);
+        depths_m.push_back(depths.truth(y, x));
+      }
+      if (!depths.hasEstimate(y, x)) continue;
+      estimate(y, x) = depths.estimate(y, x);
+      const double truth_m = bestTruth(depths, {x, y}, options.pairing);
+      if (!(truth_m > 0)) continue;
+      error(y, x) = static_cast<float>(std::abs(depths.estimate(y, x) - truth_m));
+      errors_m.push_back(error(y, x));
+    }
+  }
+  const AxisRange range = usualRange(depths_m, AxisScale::kLogarithmic);
+  double max_error_m = quantileOf(errors_m, errors_m.empty() ? 1 : 0.95);
   if (!(max_error_m > 0)) max_error_m = 0.01;
   const std::string title = fmt::format("estimate {}, {} points", map.name, map.errors.points);
-  return sideBySide({drawValues({title, shown.estimate, depths, "m", Palette::kBrightToDark}),
-                     drawValues({"truth", shown.truth, depths, "m", Palette::kBrightToDark}),
-                     drawValues({"absolute error", shown.error, {0, max_error_m}, "m"})});
+  return sideBySide({drawValues({title, estimate, range, "m", Palette::kBrightToDark}),
+                     drawValues({"truth", truth, range, "m", Palette::kBrightToDark}),
+                     drawValues({"absolute error", error, {0, max_error_m}, "m"})});
 }
 
 cv::Mat3b detectionPlot(const PrecisionRecall& detection) {

@@ -53,8 +53,6 @@ struct StereoBaseline {
   double focal_px = 0;    ///< Above 0.
   double baseline_m = 0;  ///< Above 0.
   std::string source;     ///< The file of both values, or "as given". For tables.
-
-  double focalBaseline() const { return focal_px * baseline_m; }
 };
 
 /// Reads the stereo pair from the report.json of the run that wrote the estimate, in `estimate` or

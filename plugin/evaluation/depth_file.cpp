@@ -111,15 +111,6 @@ int side(const WordLine& line, std::size_t word) {
   return static_cast<int>(pixels);
 }
 
-double scaleOf(const WordLine& line) {
-  double scale = 0;
-  if (line.words.size() == 1) scale = parseFinite(line.words[0]).value_or(0);
-  if (scale == 0) {
-    line.refuse("expected one number, the scale, below 0 where the data are little endian");
-  }
-  return scale;
-}
-
 /// Whether these are the first bytes of a PFM ("portable float map", Debevec), grey or coloured.
 bool looksLikePfm(std::string_view bytes) {
   return bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == 'f' || bytes[1] == 'F') &&
@@ -139,7 +130,11 @@ cv::Mat1f parsePfm(std::string_view bytes) {
   if (sides.words.size() != 2) sides.refuse("expected width and height");
   const int width = side(sides, 0);
   const int height = side(sides, 1);
-  const bool big_endian = scaleOf(wordLine(cursor, "the scale")) > 0;
+  const WordLine line = wordLine(cursor, "the scale");
+  const double scale = line.words.size() == 1 ? parseFinite(line.words[0]).value_or(0) : 0;
+  if (scale == 0) {
+    line.refuse("expected one number, the scale, below 0 where the data are little endian");
+  }
 
   cv::Mat1f image(height, width);
   const std::size_t expected = image.total() * sizeof(float);
@@ -149,7 +144,7 @@ cv::Mat1f parsePfm(std::string_view bytes) {
   }
   const char* at = cursor.take(expected).data();
   for (float& value : image) {
-    value = static_cast<float>(numberAt(at, NumberType::kFloat32, big_endian));
+    value = static_cast<float>(numberAt(at, NumberType::kFloat32, scale > 0));
     at += sizeof(float);
   }
   cv::flip(image, image, 0);
@@ -211,9 +206,11 @@ fs::path fileInFolder(const fs::path& path, std::initializer_list<const char*> n
 namespace {
 
 /// <t>/depth.tiff
-std::vector<TimedFile> keyframesOf(const fs::path& folder) {
+std::vector<TimedFile> keyframesIn(const fs::path& folder) {
   std::vector<TimedFile> maps;
-  for (const auto& entry : fs::directory_iterator(folder)) {
+  const fs::path keyframes = folder / "keyframes";
+  for (const auto& entry :
+       fs::directory_iterator(fs::is_directory(keyframes) ? keyframes : folder)) {
     const auto t_ns = parseSeconds(entry.path().filename().string());
     const fs::path file = entry.path() / "depth.tiff";
     if (t_ns && fs::exists(file)) maps.push_back({*t_ns, file});
@@ -221,35 +218,25 @@ std::vector<TimedFile> keyframesOf(const fs::path& folder) {
   return maps;
 }
 
-std::vector<TimedFile> listedIn(const fs::path& index) {
-  std::vector<TimedFile> maps = timedFilesIn(index);
-  if (maps.empty()) throw std::runtime_error(index.string() + " lists no depth maps");
-  return maps;
-}
-
-/// The time in a name like "1.25.tiff" or "cam0_1.25.tiff".
-std::optional<std::int64_t> timeInName(const fs::path& file) {
-  const std::set<std::string> extensions = {".tiff", ".tif", ".pfm", ".npy", ".png"};
-  if (extensions.count(file.extension().string()) == 0) return std::nullopt;
-  const std::string stem = file.stem().string();
-  return parseSeconds(stem.substr(stem.rfind('_') + 1));
-}
-
+/// Files with their time in the name, like "1.25.tiff" or "cam0_1.25.tiff".
 std::vector<TimedFile> namedIn(const fs::path& folder) {
+  const std::set<std::string> extensions = {".tiff", ".tif", ".pfm", ".npy", ".png"};
   std::vector<TimedFile> maps;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (const auto t_ns = timeInName(entry.path())) maps.push_back({*t_ns, entry.path()});
+    if (extensions.count(entry.path().extension().string()) == 0) continue;
+    const std::string stem = entry.path().stem().string();
+    const auto t_ns = parseSeconds(stem.substr(stem.rfind('_') + 1));
+    if (t_ns) maps.push_back({*t_ns, entry.path()});
   }
   return maps;
 }
 
-std::vector<TimedFile> keyframesIn(const fs::path& folder) {
-  return keyframesOf(fs::is_directory(folder / "keyframes") ? folder / "keyframes" : folder);
-}
-
 std::vector<TimedFile> indexIn(const fs::path& folder) {
   for (const fs::path& index : {folder / "depth" / "index.txt", folder / "index.txt"}) {
-    if (fs::exists(index)) return listedIn(index);
+    if (!fs::exists(index)) continue;
+    std::vector<TimedFile> maps = timedFilesIn(index);
+    if (maps.empty()) throw std::runtime_error(index.string() + " lists no depth maps");
+    return maps;
   }
   return {};
 }

@@ -21,11 +21,6 @@ inline std::string jsonText(const EvaluationJson& json) {
   return json.dump(2, ' ', false, EvaluationJson::error_handler_t::replace) + "\n";
 }
 
-/// A number with this number of decimals.
-inline std::string fixedText(double value, int decimals) {
-  return fmt::format("{:.{}f}", value, decimals);
-}
-
 /// A column of a table: the values of a key, numbers times a factor.
 struct TableColumn {
   const char* name;
@@ -37,7 +32,8 @@ struct TableColumn {
   std::string textIn(const EvaluationJson& object) const {
     const auto found = object.find(key);
     if (found == object.end()) return "-";
-    return found->is_string() ? std::string(*found) : fixedText(factor * double(*found), decimals);
+    return found->is_string() ? std::string(*found)
+                              : fmt::format("{:.{}f}", factor * double(*found), decimals);
   }
 };
 

@@ -38,16 +38,6 @@ std::vector<RelativeSpacing> usualSpacings(double true_length_m) {
   return spacings;
 }
 
-Rigid3 aligned(const TrajectoryEvaluation& evaluation, const std::filesystem::path& estimate) {
-  try {
-    return alignTrajectories(evaluation.pairs, evaluation.alignment);
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(
-        fmt::format("{}: cannot be aligned: {} (--align origin or none needs less)",
-                    estimate.string(), error.what()));
-  }
-}
-
 EvaluationJson asJson(const SampleStatistics& statistics, double factor) {
   return {{"rmse", factor * statistics.rms},      {"mean", factor * statistics.mean},
           {"median", factor * statistics.median}, {"std", factor * statistics.stddev},
@@ -153,7 +143,13 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                     estimate_file.string(), options.max_difference_s, truth_file.string()));
   }
   evaluation.alignment = options.alignment;
-  evaluation.T_world_map = aligned(evaluation, estimate_file);
+  try {
+    evaluation.T_world_map = alignTrajectories(evaluation.pairs, evaluation.alignment);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(
+        fmt::format("{}: cannot be aligned: {} (--align origin or none needs less)",
+                    estimate_file.string(), error.what()));
+  }
   evaluation.errors = absoluteErrors(evaluation.pairs, evaluation.T_world_map);
   evaluation.true_length_m = trueLength(evaluation.pairs);
   const auto spacings =
@@ -258,7 +254,7 @@ cv::Mat3b overTime(const TrajectoryEvaluation& evaluation, const std::vector<dou
   }
   const double rmse = factor * statisticsOf(errors).rms;
   CurvePlot plot;
-  plot.title = "absolute error of " + label + ", RMSE " + fixedText(rmse, 4);
+  plot.title = fmt::format("absolute error of {}, RMSE {:.4f}", label, rmse);
   plot.x.label = "time since the first pose [s]";
   plot.y.label = label;
   plot.y.from = 0;
