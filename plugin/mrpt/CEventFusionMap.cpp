@@ -194,8 +194,6 @@ void writeSimpleMap(const std::filesystem::path& file,
 using mrpt::maps::CSimplePointsMap;
 using mrpt::serialization::CArchive;
 
-// --- From an .ini ----------------------------------------------------------------------------
-
 CEventFusionMap::TMapDefinition::TMapDefinition() = default;
 
 void CEventFusionMap::TMapDefinition::loadFromConfigFile_map_specific(
@@ -232,8 +230,6 @@ mrpt::maps::CMetricMap* CEventFusionMap::internal_CreateFromMapDefinition(
 }
 
 CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(options) {}
-
-// --- Inserting -------------------------------------------------------------------------------
 
 void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
   cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
@@ -282,8 +278,6 @@ double CEventFusionMap::internal_computeObservationLikelihood(
   return 0;
 }
 
-// --- Storing ---------------------------------------------------------------------------------
-
 std::uint8_t CEventFusionMap::serializeGetVersion() const { return 2; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
@@ -330,8 +324,6 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
   cloud_ = std::move(read.cloud_);
   simple_points_.reset();
 }
-
-// --- Showing ---------------------------------------------------------------------------------
 
 bool CEventFusionMap::isEmpty() const {
   return std::all_of(keyframes_.begin(), keyframes_.end(),

@@ -81,7 +81,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
   mapper_->setSink(sink_);
-  tracker_poses_.clear();
+  tracker_poses_ = {};
   options_ = builder_options;
   ignored_observations_ = 0;
   reckoning_ = {};
@@ -177,8 +177,6 @@ std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
   return mapper()->keyframes()->tracker_trajectory;
 }
 
-// --- mrpt::config::CLoadableOptions ----------------------------------------------------------
-
 void CEventFusionMapBuilder::loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
                                                 const std::string& prefix) {
   OptionReader reader(usedOptions());
@@ -190,8 +188,6 @@ void CEventFusionMapBuilder::saveToConfigFile(mrpt::config::CConfigFileBase& tar
                                               const std::string& prefix) const {
   writeHostOptions(usedOptions(), prefix, target);
 }
-
-// --- mrpt::slam::CMetricMapBuilder -----------------------------------------------------------
 
 void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
                                         const mrpt::poses::CPosePDF* /*x0*/) {

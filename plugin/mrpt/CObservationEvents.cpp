@@ -153,10 +153,6 @@ void CObservationEvents::getDescriptionAsText(std::ostream& stream) const {
   stream << "\nPose on the rig: " << camera_pose.asString() << "\n";
 }
 
-void CObservationEvents::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
-  drawEvents(*this, out);
-}
-
 std::string CObservationEvents::exportTxtHeader() const {
   return "NUM_EVENTS [TIME_S X Y POLARITY] x NUM_EVENTS";
 }
@@ -228,14 +224,14 @@ RigCamera calibrationOf(const CObservationEvents& packet) {
   return {packet.camera, rigidFrom(packet.camera_pose), packet.time_offset_ns};
 }
 
-void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& out) {
-  auto camera = mrpt::opengl::CSetOfObjects::Create();
-  camera->setPose(packet.camera_pose);
-  camera->insert(mrpt::opengl::stock_objects::CornerXYZSimple(0.5F, 2.0F));
-  const CameraModel model = drawnModel(packet.camera);
-  camera->insert(frustumOf(model));
-  camera->insert(pointsOf(packet, model));
-  out.insert(camera);
+void CObservationEvents::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
+  auto drawn = mrpt::opengl::CSetOfObjects::Create();
+  drawn->setPose(camera_pose);
+  drawn->insert(mrpt::opengl::stock_objects::CornerXYZSimple(0.5F, 2.0F));
+  const CameraModel model = drawnModel(camera);
+  drawn->insert(frustumOf(model));
+  drawn->insert(pointsOf(*this, model));
+  out.insert(drawn);
 }
 
 }  // namespace efm

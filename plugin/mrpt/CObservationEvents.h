@@ -48,7 +48,9 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
   void setSensorPose(const mrpt::poses::CPose3D& pose) override { camera_pose = pose; }
   void getDescriptionAsText(std::ostream& stream) const override;
-  /// RawLogViewer's 3D view of the packet: see `drawEvents`.
+  /// Draws the packet at its camera's pose on the rig, as RawLogViewer shows it: the axes of the
+  /// camera, its view frustum up to the image plane at z = kDrawnPlaneM, and a point on this plane
+  /// for each event: ON red, OFF blue. The image is not undistorted.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
 
   /// For `rawlog-edit --export-txt`, which writes a line per packet: the number of events, then
@@ -62,17 +64,7 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
   void readContent(mrpt::serialization::CArchive& in, std::uint8_t version);
 };
 
-}  // namespace efm
-
 #pragma GCC diagnostic pop
-
-namespace mrpt::opengl {
-
-class CSetOfObjects;
-
-}  // namespace mrpt::opengl
-
-namespace efm {
 
 RigCamera calibrationOf(const CObservationEvents& packet);
 
@@ -91,10 +83,5 @@ class ReadEventsOf {
 inline constexpr std::size_t kMaxDrawnEvents = 50'000;
 /// The distance of the drawn image plane, for a viewer whose first view spans some twenty metres.
 inline constexpr double kDrawnPlaneM = 3;
-
-/// Draws a packet at its camera's pose on the rig: the axes of the camera, its view frustum up to
-/// the image plane at z = kDrawnPlaneM, and a point on this plane for each event: ON red, OFF blue.
-/// The image is not undistorted.
-void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& out);
 
 }  // namespace efm

@@ -20,26 +20,9 @@ std::filesystem::path fileOf(const mrpt::config::CConfigFileBase& source) {
   return file ? file->getAssociatedFile() : std::string();
 }
 
-/// MRPT treats a missing file as an empty one.
-void requireFile(const mrpt::config::CConfigFileBase& source) {
-  const std::filesystem::path file = fileOf(source);
-  if (file.empty() || std::filesystem::exists(file)) return;
-  throw std::runtime_error("cannot read the option file " + file.string());
-}
-
 std::string nameOf(const mrpt::config::CConfigFileBase& source) {
   const std::filesystem::path file = fileOf(source);
   return file.empty() ? "options" : file.string();
-}
-
-/// Where the values of a section come from: `placeIn`, and the folder of the host's file. Without a
-/// file, the folder is empty: the working folder.
-OptionOrigin originIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
-  OptionOrigin origin{placeIn(source, section), {}};
-  // Absolute, so that options saved to another folder name the same files.
-  const std::filesystem::path file = fileOf(source);
-  if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
-  return origin;
 }
 
 }  // namespace
@@ -62,7 +45,11 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
                      std::string_view section, OptionReader& reader) {
   std::vector<std::string> keys;
   source.getAllKeys(host_section, keys);
-  const OptionOrigin origin = originIn(source, host_section);
+  // Without a file, paths in the values are relative to the working folder. The folder is absolute,
+  // so that options saved to another folder name the same files.
+  OptionOrigin origin{placeIn(source, host_section), {}};
+  const std::filesystem::path file = fileOf(source);
+  if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
   for (const std::string& key : keys) {
     reader.set(section, key, source.read_string(host_section, key, ""), origin);
   }
@@ -70,7 +57,10 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
 
 void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::string& prefix,
                      OptionReader& reader) {
-  requireFile(source);
+  // MRPT treats a missing file as an empty one.
+  if (const auto file = fileOf(source); !file.empty() && !std::filesystem::exists(file)) {
+    throw std::runtime_error("cannot read the option file " + file.string());
+  }
   if (!prefix.empty()) {
     const std::vector<std::string> ours = sectionsBelow(source, prefix);
     if (ours.empty()) {

@@ -100,7 +100,6 @@ class TrackerPoses {
   ///   world counts.
   /// @return null before its first pose.
   const mrpt::poses::CPose3DPDFGaussian* newest(const std::optional<PoseSourceId>& selected) const;
-  void clear() { newest_.clear(); }
 
  private:
   struct Newest {
