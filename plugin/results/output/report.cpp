@@ -189,11 +189,6 @@ std::uint64_t peakMemoryBytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
 }
 
-double votesPerSecond(const MapReport& report) {
-  const double sweep_s = report.times.real.sweep;
-  return sweep_s > 0 ? static_cast<double>(report.counts.votes.total()) / sweep_s : 0;
-}
-
 void describePoints(const MapCloud& cloud, MapReport& report) {
   constexpr double kFar = 0.001;
   report.points = cloud.size();
@@ -236,7 +231,9 @@ std::string reportJson(const MapReport& report) {
   json["recording_seconds"] = report.recording_s;
   json["seconds"] = asJson(report.times.real);
   json["cpu_seconds"] = byGrowth(report.times.cpu);
-  json["votes_per_second"] = votesPerSecond(report);
+  const double sweep_s = report.times.real.sweep;
+  json["votes_per_second"] =
+      sweep_s > 0 ? static_cast<double>(counts.votes.total()) / sweep_s : 0.0;
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
   json["threads"] = sweep.threadsOrCores();
   json["peak_memory_bytes"] = report.peak_memory_bytes;

@@ -103,9 +103,6 @@ std::string reportJson(const MapReport& report);
 /// The most memory that this process has had so far.
 std::uint64_t peakMemoryBytes();
 
-/// Votes (used events times planes) over the sweep's seconds; 0 without a sweep.
-double votesPerSecond(const MapReport& report);
-
 /// The result of a run in plain words, for the user: a line per fact, under 20 lines. A fact that
 /// is not known or does not apply has no line.
 /// @param kind `kDepth`: of one keyframe.

@@ -12,7 +12,6 @@
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
-#include "plugin/results/pictures/curve_plot.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/picture.h"
 
@@ -42,18 +41,6 @@ struct Extent {
   double length() const { return high - low; }
 };
 
-/// The ends of the values without the lowest and the highest percent.
-Extent robustExtent(std::vector<double>& values) {
-  Extent extent;
-  if (values.empty()) return extent;
-  for (const double fraction : {0.01, 0.99}) {
-    const auto at = values.begin() + std::lround(fraction * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    extent.add(*at);
-  }
-  return extent;
-}
-
 /// The positions that decide what is shown.
 class ShownPositions {
  public:
@@ -63,14 +50,23 @@ class ShownPositions {
     const std::size_t step = cloud.size() / kSamples + 1;
     for (std::size_t i = 0; i < cloud.size(); i += step) {
       samples_.push_back(positionIn(cloud, cloud[i]));
-    };
+    }
   }
 
+  /// Without the lowest and the highest percent of the points.
   Extent ofPoints(const Eigen::Vector3d& axis) const {
     std::vector<double> values(samples_.size());
     std::transform(samples_.begin(), samples_.end(), values.begin(),
                    [&](const Eigen::Vector3d& p) { return p.dot(axis); });
-    return robustExtent(values);
+    Extent extent;
+    if (values.empty()) return extent;
+    for (const double fraction : {0.01, 0.99}) {
+      const auto at =
+          values.begin() + std::lround(fraction * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), at, values.end());
+      extent.add(*at);
+    }
+    return extent;
   }
 
   Extent along(const Eigen::Vector3d& axis) const {
@@ -290,17 +286,14 @@ class Splats {
   cv::Mat1f heights_;  // sums, weighted
 };
 
-AxisRange heightsOf(const MapLayout& layout) { return {layout.heights_m[0], layout.heights_m[1]}; }
-
 void drawPoints(cv::Mat3b& picture, const MapView& view, const MapCloud& cloud,
                 const MapLayout& layout, double sigma) {
   const Eigen::Vector3d& up = layout.side.upwards;
-  const AxisRange heights = heightsOf(layout);
   Splats splats(view.area.size());
   const cv::Point2d corner = view.area.tl();
   for (const MapPoint& point : cloud) {
     const Eigen::Vector3d p_world = positionIn(cloud, point);
-    const double level = std::clamp(heights.fractionAlong(p_world.dot(up)), 0.0, 1.0);
+    const double level = std::clamp(layout.heights_m.fractionAlong(p_world.dot(up)), 0.0, 1.0);
     splats.add(view.pixelOf(p_world) - corner, static_cast<float>(level));
   }
   splats.picture(sigma).copyTo(picture(view.area));
@@ -359,7 +352,7 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
   writeText(picture, "start to end", {sample.x - 6, area.br().y - 10}, kLabelScale);
   if (!has_points) return;
   const int width = std::min(600, area.width - 460);
-  const cv::Mat3b bar = drawBar(heightsOf(layout), kHeightPalette, "height (m)", width);
+  const cv::Mat3b bar = drawBar(layout.heights_m, kHeightPalette, "height (m)", width);
   bar.copyTo(picture(cv::Rect({area.br().x - width, area.y + 6}, bar.size())));
 }
 

@@ -4,11 +4,11 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include <array>
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 
@@ -29,8 +29,8 @@ struct MapLayout {
   cv::Size size;  ///< Of the whole picture, pixels.
   MapView top;
   MapView side;
-  cv::Rect legend;                           ///< Below the views.
-  std::array<double, 2> heights_m = {0, 1};  ///< Along `side.upwards`: the range of the colours.
+  cv::Rect legend;      ///< Below the views.
+  AxisRange heights_m;  ///< Along `side.upwards`: the range of the colours.
 };
 
 /// Lays out the top view and the side view of a map, side by side or one above the other and turned

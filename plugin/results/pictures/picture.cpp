@@ -59,23 +59,15 @@ cv::Mat3b oneBelowAnother(const std::vector<cv::Mat3b>& pictures) {
 
 namespace {
 
-/// A part of one of OpenCV's colour maps; `from` > `to` reverses it.
-struct PaletteSource {
-  cv::ColormapTypes map;
-  double from;
-  double to;
-};
-
-PaletteSource sourceOf(Palette palette) {
-  if (palette == Palette::kBlueToRed) return {cv::COLORMAP_JET, 0, 1};
-  if (palette == Palette::kRainbow) return {cv::COLORMAP_TURBO, 0.06, 0.96};
-  return {cv::COLORMAP_PLASMA, 0.88, 0};  // kBrightToDark
-}
-
-/// The colours of the levels 0 to 255.
+/// The colours of the levels 0 to 255: a part of one of OpenCV's colour maps.
 cv::Mat3b tableOf(Palette palette) {
+  struct {
+    cv::ColormapTypes map;
+    double from, to;
+  } source = {cv::COLORMAP_PLASMA, 0.88, 0};  // kBrightToDark: reversed
+  if (palette == Palette::kBlueToRed) source = {cv::COLORMAP_JET, 0, 1};
+  if (palette == Palette::kRainbow) source = {cv::COLORMAP_TURBO, 0.06, 0.96};
   cv::Mat1b positions(1, 256);
-  const PaletteSource source = sourceOf(palette);
   for (int level = 0; level < 256; ++level) {
     positions(0, level) =
         cv::saturate_cast<uchar>(255 * source.from + (source.to - source.from) * level);
