@@ -208,34 +208,16 @@ cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
   return mask;
 }
 
-/// The scale of the peaks of a keyframe: with a short baseline they are wide.
-struct PeakScale {
-  double step_planes = 1;  ///< Planes per step.
-  std::size_t second =
-      0;  ///< Index into `AggregatedPeak::second_peak`: the distance where the peak ends.
-};
-
-PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, double step_planes) {
-  PeakScale scale;
-  scale.step_planes = step_planes;
-  if (peaks.empty()) return scale;
+/// The distance where a peak of the keyframe ends: with a short baseline peaks are wide.
+/// @return index into `AggregatedPeak::second_peak`.
+std::size_t peakEnd(const std::vector<AggregatedPeak>& peaks, double step_planes) {
+  if (peaks.empty()) return 0;
   std::vector<float> widths_sq;
   for (const AggregatedPeak& peak : peaks) widths_sq.push_back(peak.width_sq);
   const double steps =
-      std::clamp(std::round(kPeakWidths * std::sqrt(upperMedian(widths_sq)) / scale.step_planes),
+      std::clamp(std::round(kPeakWidths * std::sqrt(upperMedian(widths_sq)) / step_planes),
                  double{AggregatedPeak::kMinSteps}, double{AggregatedPeak::kMaxSteps});
-  scale.second = static_cast<std::size_t>(steps) - AggregatedPeak::kMinSteps;
-  return scale;
-}
-
-/// Local contrast, lowered for ambiguous peaks and disagreeing neighbours.
-double qualityOf(double contrast, const AggregatedPeak& peak, const LocalAgreement& around,
-                 const PeakScale& scale) {
-  const double unambiguous =
-      std::pow(std::max(0.0, 1.0 - peak.second_peak[scale.second]), kSteepness);
-  const double off_median = std::abs(peak.position - around.median);
-  return contrast * unambiguous * std::exp(-off_median / (kMedianSteps * scale.step_planes)) *
-         around.agreeing_fraction;
+  return static_cast<std::size_t>(steps) - AggregatedPeak::kMinSteps;
 }
 
 /// Variance of a position, planes^2. It grows with the width of the peak and with the spread of the
@@ -267,10 +249,18 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     positions[i] = peaks[i].position;
     weights[i] = contrast(at);
   });
-  const PeakScale scale = scaleOf(peaks, step_planes);
+  const std::size_t second = peakEnd(peaks, step_planes);
   const std::vector<LocalAgreement> around = localAgreement(
-      candidates, positions, weights, static_cast<float>(kAgreementSteps * scale.step_planes));
+      candidates, positions, weights, static_cast<float>(kAgreementSteps * step_planes));
 
+  /// Local contrast, lowered for ambiguous peaks and disagreeing neighbours.
+  const auto quality_of = [&](std::size_t i) {
+    const double unambiguous =
+        std::pow(std::max(0.0, 1.0 - peaks[i].second_peak[second]), kSteepness);
+    const double off_median = std::abs(peaks[i].position - around[i].median);
+    return weights[i] * unambiguous * std::exp(-off_median / (kMedianSteps * step_planes)) *
+           around[i].agreeing_fraction;
+  };
   const bool has_inner_planes = planes.size() > 2;
   // No depth can be told where all planes lie within a pixel of parallax.
   const bool all_alike = has_inner_planes && range_px < 1;
@@ -283,7 +273,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
       ++(2 * peaks[i].position < float(planes.size()) ? counts.at_nearest : counts.at_farthest);
       return;
     }
-    if (all_alike || !(qualityOf(weights[i], peaks[i], around[i], scale) > options.min_quality)) {
+    if (all_alike || !(quality_of(i) > options.min_quality)) {
       ++counts.ambiguous;
       return;
     }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option.h"
 #include "mapping/depth/aggregated_extraction.h"
 #include "mapping/depth/peak_fit.h"
 
@@ -31,8 +30,6 @@ void DepthExtractionOptions::validate() const {
                 "max_confidence", white, "finite and above 0");
 }
 
-bool usesColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
-
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options, const KeyframeFacts& facts) {
   options.validate();
@@ -54,33 +51,6 @@ double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
   return maximum;
 }
 
-/// Grey values of the confidence: 255 at `white`.
-cv::Mat1b quantise(const cv::Mat1f& confidence, double white) {
-  cv::Mat1b grey = cv::Mat1b::zeros(confidence.size());
-  if (white > 0) confidence.convertTo(grey, CV_8U, 255.0 / white);  // rounds and clips
-  return grey;
-}
-
-/// Adaptive Gaussian thresholding: non-zero where a pixel is above its surroundings by more than C.
-cv::Mat1b adaptiveThreshold(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
-  cv::Mat1b mask;
-  cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
-                        options.threshold_kernel, -options.threshold_c);
-  return mask;
-}
-
-/// Positions of the peaks between planes.
-std::vector<float> positionsOf(const DsiPeaks& peaks, const SparseMask& mask, bool subplane) {
-  std::vector<float> positions(mask.size());
-  mask.forEach([&](std::size_t i, cv::Point at) {
-    const int plane = peaks.plane(at);
-    positions[i] = static_cast<float>(
-        subplane ? peakPosition(plane, peaks.before(at), peaks.confidence(at), peaks.after(at))
-                 : plane);
-  });
-  return positions;
-}
-
 }  // namespace
 
 DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
@@ -88,9 +58,20 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
                         std::optional<double> sequence_maximum) {
   options.validate();
   const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
-  const cv::Mat1b mask = adaptiveThreshold(quantise(peaks.confidence, white), options);
+  cv::Mat1b grey = cv::Mat1b::zeros(peaks.confidence.size());
+  if (white > 0) peaks.confidence.convertTo(grey, CV_8U, 255.0 / white);  // rounds and clips
+  cv::Mat1b mask;
+  cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
+                        options.threshold_kernel, -options.threshold_c);
   const SparseMask sparse(mask);
-  const std::vector<float> positions = positionsOf(peaks, sparse, options.subplane);
+  std::vector<float> positions(sparse.size());  // between planes
+  sparse.forEach([&](std::size_t i, cv::Point at) {
+    const int plane = peaks.plane(at);
+    positions[i] =
+        static_cast<float>(options.subplane ? peakPosition(plane, peaks.before(at),
+                                                           peaks.confidence(at), peaks.after(at))
+                                            : plane);
+  });
   const std::vector<float> medians = maskedMedian(sparse, positions, options.median_size);
   std::vector<PlanePosition> found(sparse.size());
   sparse.forEach([&](std::size_t i, cv::Point at) {

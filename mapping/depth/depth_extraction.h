@@ -15,11 +15,10 @@ namespace efm {
 /// How pixels and depths are selected from the DSI.
 enum class ExtractionMethod {
   kPaper,  ///< Adaptive Gaussian thresholding and a median filter (Rebecq et al., IJCV 2018, 6.2).
-  kAggregated,  ///< Depth from the summed columns of neighbouring pixels, kept where they agree.
+  /// Depth from the summed columns of neighbouring pixels, kept where they agree. Needs the columns
+  /// of the DSI in addition to its peaks.
+  kAggregated,
 };
-
-/// Whether the method needs the columns of the DSI in addition to its peaks.
-bool usesColumns(ExtractionMethod method);
 
 std::string_view nameOf(ExtractionMethod method);
 ExtractionMethod extractionMethodFromName(std::string_view name);

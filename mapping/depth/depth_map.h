@@ -64,7 +64,12 @@ class PixelNeighbours {
   /// Calls `visit(index, offset)` for each, row by row.
   template <typename Visit>
   void forEach(cv::Point pixel, Visit visit) {
-    if (pixel.y != last_.y || pixel.x < last_.x) begins_ = rowBegins(pixel.y);
+    if (pixel.y != last_.y || pixel.x < last_.x) {
+      for (int row = 0; row < kRows; ++row) {
+        const int of_mask = std::clamp(pixel.y - kRadius_px + row, 0, mask_->rows());
+        begins_[static_cast<std::size_t>(row)] = mask_->rowBegin(of_mask);
+      }
+    }
     last_ = pixel;
     const int first = std::max(0, pixel.y - kRadius_px);
     const int last = std::min(mask_->rows() - 1, pixel.y + kRadius_px);
@@ -79,20 +84,9 @@ class PixelNeighbours {
   }
 
  private:
-  using Begins = std::array<std::size_t, kRows>;  // by row of the window
-
-  Begins rowBegins(int y) const {
-    Begins begins{};
-    for (int row = 0; row < kRows; ++row) {
-      const int of_mask = std::clamp(y - kRadius_px + row, 0, mask_->rows());
-      begins[static_cast<std::size_t>(row)] = mask_->rowBegin(of_mask);
-    }
-    return begins;
-  }
-
   const SparseMask* mask_;
   cv::Point last_{0, -1};
-  Begins begins_{};
+  std::array<std::size_t, kRows> begins_{};  // by row of the window
 };
 
 /// What became of the pixels with local contrast, which could have a depth.

@@ -8,15 +8,6 @@
 namespace efm {
 namespace {
 
-/// The indices of the values in increasing order.
-std::vector<std::uint32_t> inOrder(const std::vector<float>& values) {
-  std::vector<std::uint32_t> order(values.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return values[a] < values[b]; });
-  return order;
-}
-
 /// A set of ranks below a limit with fast access to its k-th element: single ranks, and counts of
 /// 256 consecutive ones. A search starts where the last one ended, because neighbouring windows
 /// have similar medians.
@@ -79,7 +70,10 @@ std::vector<float> maskedMedian(const SparseMask& mask, const std::vector<float>
                                 int window) {
   if (window == 1) return values;
   const int radius = window / 2;
-  const std::vector<std::uint32_t> order = inOrder(values);
+  std::vector<std::uint32_t> order(values.size());  // indices of the values in increasing order
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return values[a] < values[b]; });
   std::vector<std::uint32_t> rank(values.size());
   for (std::size_t i = 0; i < order.size(); ++i) rank[order[i]] = static_cast<std::uint32_t>(i);
 

@@ -111,12 +111,13 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
     newest_ns_ = std::max(newest_ns_.value_or(event.t_ns), event.t_ns);
   }
   const auto isUnwanted = [&](const Event& event) {
+    const auto width = static_cast<std::size_t>(model_.width);
     std::optional<EventFate> fate;
     if (selected_ && !limits.contain(event.t_ns)) {
       fate = EventFate::kOutsideWindow;
     } else if (!selected_ || event.t_ns < released_ns) {
       fate = EventFate::kDropped;
-    } else if (isOutsideLens(event)) {
+    } else if (!outside_lens_.empty() && outside_lens_[event.y * width + event.x]) {
       fate = EventFate::kOutsideLens;
     }
     if (fate) ++counts_[*fate];
@@ -136,10 +137,6 @@ void CameraStream::coverUntil(std::int64_t t_ns) {
   const std::int64_t own_ns = std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs);
   covered_ns_ =
       std::max(covered_ns_, std::clamp(onTrajectoryClock(own_ns), -kEndOfTimeNs, kEndOfTimeNs));
-}
-
-void CameraStream::filterUntil(std::int64_t t_ns) {
-  if (filter_) counts_[EventFate::kFiltered] += filter_->release(t_ns, buffer_);
 }
 
 std::optional<std::int64_t> CameraStream::firstFrom(std::int64_t t_ns) const {

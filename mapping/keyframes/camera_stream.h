@@ -40,7 +40,9 @@ class CameraStream {
   void coverUntil(std::int64_t t_ns);
   /// Filters the events before a time and moves the others to the buffer. No event before this time
   /// may be added afterwards.
-  void filterUntil(std::int64_t t_ns);
+  void filterUntil(std::int64_t t_ns) {
+    if (filter_) counts_[EventFate::kFiltered] += filter_->release(t_ns, buffer_);
+  }
 
   bool selected() const { return selected_; }
   std::int64_t onTrajectoryClock(std::int64_t t_ns) const { return t_ns + time_offset_ns_; }
@@ -73,11 +75,6 @@ class CameraStream {
   void release(std::int64_t until_ns, const Trajectory& trajectory);
 
  private:
-  bool isOutsideLens(const Event& event) const {
-    return !outside_lens_.empty() &&
-           outside_lens_[std::size_t{event.y} * static_cast<std::size_t>(model_.width) + event.x];
-  }
-
   std::int64_t lateBefore() const;
 
   int index_;

@@ -116,10 +116,6 @@ void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
 }
 
-void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
-  cameras_.at(static_cast<std::size_t>(camera)).coverUntil(t_ns);
-}
-
 void FusionMapper::coverAllUntil(std::int64_t t_ns) {
   for (CameraStream& camera : cameras_) camera.coverUntil(t_ns - camera.onTrajectoryClock(0));
   if (!start_ns_) dropWindowsBefore(t_ns, DropReason::kNoPose);
@@ -139,7 +135,11 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
     releaseBefore(releasableUntil());
     if (keyframe) return keyframe;
   }
-  releaseUnneeded();
+  if (finished_) {
+    releaseBefore(kMaxTimeNs);
+  } else if (start_ns_) {
+    releaseBefore(releasableUntil());
+  }
   return std::nullopt;
 }
 
@@ -206,15 +206,15 @@ void FusionMapper::loseKeyframe() {
 }
 
 std::size_t FusionMapper::heldEvents() const {
-  return std::accumulate(
-      cameras_.begin(), cameras_.end(), std::size_t{0},
-      [](std::size_t sum, const CameraStream& camera) { return sum + camera.heldEvents(); });
+  std::size_t held = 0;
+  for (const CameraStream& camera : cameras_) held += camera.heldEvents();
+  return held;
 }
 
 std::uint64_t FusionMapper::readEvents() const {
-  return std::accumulate(
-      cameras_.begin(), cameras_.end(), std::uint64_t{0},
-      [](std::uint64_t sum, const CameraStream& camera) { return sum + camera.counts().read; });
+  std::uint64_t read = 0;
+  for (const CameraStream& camera : cameras_) read += camera.counts().read;
+  return read;
 }
 
 std::int64_t FusionMapper::oldestHeldNs() const {
@@ -276,15 +276,6 @@ std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
   return events;
 }
 
-/// Where no window is covered.
-void FusionMapper::releaseUnneeded() {
-  if (finished_) {
-    releaseBefore(kMaxTimeNs);
-  } else if (start_ns_) {
-    releaseBefore(releasableUntil());
-  }
-}
-
 /// The filters see an event once no earlier one of its camera can come.
 void FusionMapper::filterEvents() {
   for (CameraStream& camera : cameras_) camera.filterUntil(completeUntil(camera));
@@ -337,10 +328,17 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
     return std::nullopt;
   }
   auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, stages);
-  if (keyframe) {
-    countKeyframe(*keyframe);
-  } else {
+  if (!keyframe) {
     ++counts_.keyframes_without_pose;
+    return std::nullopt;
+  }
+  ++counts_.keyframes;
+  counts_.votes += keyframe->votes;
+  counts_.silent_subintervals += keyframe->silent_subintervals;
+  counts_.event_uses =
+      std::accumulate(keyframe->events.begin(), keyframe->events.end(), counts_.event_uses);
+  for (CameraStream& camera : cameras_) {
+    camera.markUsed(window, trajectory_, options_.keyframe.max_events_per_camera);
   }
   return keyframe;
 }
@@ -355,18 +353,6 @@ KeyframeMapper& FusionMapper::keyframeMapper() const {
     mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe, std::move(tables));
   }
   return *mapper_;
-}
-
-void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
-  ++counts_.keyframes;
-  counts_.votes += keyframe.votes;
-  counts_.silent_subintervals += keyframe.silent_subintervals;
-  counts_.event_uses =
-      std::accumulate(keyframe.events.begin(), keyframe.events.end(), counts_.event_uses);
-  const std::size_t max_events = options_.keyframe.max_events_per_camera;
-  for (CameraStream& camera : cameras_) {
-    camera.markUsed(keyframe.window, trajectory_, max_events);
-  }
 }
 
 /// Events before this time are complete, with their poses, and no later window needs them.
@@ -413,8 +399,6 @@ std::int64_t FusionMapper::completeNs() const {
   return std::min(trajectory_.poses().back().t_ns, eventsCompleteNs());
 }
 
-std::int64_t FusionMapper::reachedNs() const { return reached_ns_.value_or(kMinTimeNs); }
-
 std::size_t FusionMapper::countBefore(std::int64_t t_ns) const {
   std::size_t count = 0;
   for (const CameraStream& camera : cameras_) count += camera.countBefore(t_ns);
@@ -437,10 +421,6 @@ std::optional<std::int64_t> FusionMapper::timeOfEvent(std::int64_t from_ns,
     }
   }
   return t_ns;
-}
-
-std::int64_t FusionMapper::eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const {
-  return static_cast<std::int64_t>(countBefore(t1_ns) - countBefore(t0_ns));
 }
 
 std::optional<Rigid3> FusionMapper::viewPoseAt(std::int64_t t_ns) const {

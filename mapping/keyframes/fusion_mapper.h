@@ -129,7 +129,9 @@ class FusionMapper : private RecordingProgress {
   /// camera without events does not delay the others. Without this call, a camera's events are
   /// complete until 10 ms before its newest one. A camera is silent if it has no event in the last
   /// second before the newest packet of any camera begins. A silent camera does not delay others.
-  void coverUntil(int camera, std::int64_t t_ns);
+  void coverUntil(int camera, std::int64_t t_ns) {
+    cameras_.at(static_cast<std::size_t>(camera)).coverUntil(t_ns);
+  }
   /// The same for all cameras. `t_ns` is on the trajectory's clock. Poses before it are forgotten
   /// where no window needs them.
   void coverAllUntil(std::int64_t t_ns);
@@ -191,11 +193,9 @@ class FusionMapper : private RecordingProgress {
   std::optional<Window> lastWindow();
   std::vector<EventSpan> eventsOf(const Window& window) const;
   void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason);
-  void releaseUnneeded();
   bool isCovered(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);
   KeyframeMapper& keyframeMapper() const;
-  void countKeyframe(const KeyframeDepthMap& keyframe);
   std::int64_t releasableUntil() const;
   void releaseBefore(std::int64_t t_ns);
 
@@ -204,10 +204,12 @@ class FusionMapper : private RecordingProgress {
 
   // RecordingProgress, for the policy.
   std::int64_t startNs() const override { return *start_ns_; }
-  std::int64_t reachedNs() const override;
+  std::int64_t reachedNs() const override { return reached_ns_.value_or(kMinTimeNs); }
   std::int64_t completeNs() const override;
   std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns, std::int64_t count) const override;
-  std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const override;
+  std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const override {
+    return static_cast<std::int64_t>(countBefore(t1_ns) - countBefore(t0_ns));
+  }
   std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const override;
   const ReferenceView& view() const override { return keyframeMapper().view(); }
 

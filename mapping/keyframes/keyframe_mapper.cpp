@@ -42,6 +42,9 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
   return result;
 }
 
+namespace {
+
+/// Counts the events of all cameras of a keyframe.
 void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe) {
   for (const WindowRays& camera : cameras) {
     keyframe.events[static_cast<std::size_t>(camera.camera)] = camera.events;
@@ -55,22 +58,12 @@ void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyfr
   }
 }
 
+/// Removes the cameras without rays, unless no camera has any.
 void removeSilent(std::vector<WindowRays>& cameras) {
   const auto silent = [](const WindowRays& camera) { return camera.events == 0; };
   if (std::all_of(cameras.begin(), cameras.end(), silent)) return;
   cameras.erase(std::remove_if(cameras.begin(), cameras.end(), silent), cameras.end());
 }
-
-std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout) {
-  std::vector<CameraRays> inputs;
-  for (const auto& slots : layout.inputs) {
-    CameraRays& input = inputs.emplace_back();
-    for (const auto& slot : slots) input.push_back(std::move(cameras[slot.camera].rays[slot.part]));
-  }
-  return inputs;
-}
-
-namespace {
 
 /// The contrast of the fused DSI along its peaks: large where the events of all cameras meet.
 double sharpnessOf(const KeyframeDepthMap& keyframe) {
@@ -111,27 +104,6 @@ void requireCamera(const Rig& rig, int camera, const char* key) {
   const auto count = static_cast<int>(rig.cameras.size());
   requireOption(camera >= 0 && camera < count, key, camera,
                 "a camera of the recording: 0 to " + std::to_string(count - 1));
-}
-
-/// At most `max_events` of each camera; 0: all. @param chosen holds them where there are more.
-std::vector<CameraEvents> withinBudget(std::vector<CameraEvents> cameras, std::size_t max_events,
-                                       std::vector<std::vector<Event>>& chosen) {
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    cameras[i].events = chooseEvenly(cameras[i].events, max_events, chosen[i]);
-  }
-  return cameras;
-}
-
-std::uint64_t countOf(const std::vector<CameraEvents>& cameras) {
-  std::uint64_t count = 0;
-  for (const CameraEvents& camera : cameras) count += camera.events.size();
-  return count;
-}
-
-double maximumOf(const cv::Mat1f& confidence) {
-  double maximum = 0;
-  cv::minMaxLoc(confidence, nullptr, &maximum);
-  return maximum;
 }
 
 }  // namespace
@@ -193,12 +165,14 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
                                                     StageHook* stages) {
   // 1. Input: events, trajectory, calibration.
   const std::vector<CameraEvents> all = selectedEvents(events);
-  for (const CameraEvents& camera : all) {  // what follows looks up and counts by pixel
-    requireInsideSensor(camera.events, camera.camera, camera.calibration->model);
-  }
+  std::vector<CameraEvents> cameras = all;
   std::vector<std::vector<Event>> chosen(all.size());
-  const std::vector<CameraEvents> cameras =
-      withinBudget(all, options_.max_events_per_camera, chosen);
+  std::uint64_t over_budget = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::uint32_t max_events = options_.max_events_per_camera;
+    cameras[i].events = chooseEvenly(all[i].events, max_events, chosen[i]);
+    over_budget += all[i].events.size() - cameras[i].events.size();
+  }
   // 2. One reference view for all DSIs.
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
@@ -213,7 +187,7 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
     return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along);
   });
 
-  keyframe.over_budget = countOf(all) - countOf(cameras);
+  keyframe.over_budget = over_budget;
   sequence_maximum_.add(keyframe.max_confidence);
   if (options_.event_images) {
     for (const CameraEvents& camera : all) keyframe.event_images.push_back(eventImageOf(camera));
@@ -232,7 +206,10 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
   std::vector<CameraEvents> cameras;
   for (std::size_t i = 0; i < selected_.size(); ++i) {
     const EventSpan& of_camera = events.at(static_cast<std::size_t>(selected_[i]));
-    cameras.push_back({selected_[i], &cameraOf(selected_[i]), &undistortion_[i], of_camera});
+    const RigCamera& calibration = cameraOf(selected_[i]);
+    // What follows looks up and counts by pixel.
+    requireInsideSensor(of_camera, selected_[i], calibration.model);
+    cameras.push_back({selected_[i], &calibration, &undistortion_[i], of_camera});
   }
   return cameras;
 }
@@ -246,10 +223,13 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   const auto seen = motionIn({input.window, {}, &motion}, rig_, selected_, options_);
   if (seen) keyframe.parallax_px_m = seen->parallax_px_m;
   keyframe.events.resize(rig_.cameras.size());
-  std::vector<WindowRays> cameras;
+  std::vector<WindowRays> cameras(input.cameras.size());
   {
     const StageScope scope(stages, Stage::kSweep);
-    cameras = raysOfCameras(input, motion);  // 3.
+    // 3. Divides the window into sub-intervals and back-projects their events, cameras in parallel.
+    tbb::parallel_for(std::size_t{0}, cameras.size(), [&](std::size_t i) {
+      cameras[i] = raysOf(input.cameras[i], input, motion, groups_, options_.packets);
+    });
     countEvents(cameras, keyframe);
     if (options_.exclude_silent) removeSilent(cameras);
   }
@@ -263,26 +243,22 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   return keyframe;
 }
 
-/// 3. Divides the window into sub-intervals and back-projects their events, cameras in parallel.
-std::vector<WindowRays> KeyframeMapper::raysOfCameras(const WindowInput& input,
-                                                      const Trajectory& motion) const {
-  std::vector<WindowRays> cameras(input.cameras.size());
-  tbb::parallel_for(std::size_t{0}, cameras.size(), [&](std::size_t i) {
-    cameras[i] = raysOf(input.cameras[i], input, motion, groups_, options_.packets);
-  });
-  return cameras;
-}
-
 /// 4. Votes, and fuses the DSIs across cameras and time, plane by plane. Consumes the rays.
 SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const {
   const FusionLayout layout = groups_.layoutOf(static_cast<int>(cameras.size()));
-  std::vector<CameraRays> rays = inputsOf(cameras, layout);
+  std::vector<CameraRays> rays;
+  for (const auto& slots : layout.inputs) {
+    CameraRays& input = rays.emplace_back();
+    for (const auto& slot : slots) input.push_back(std::move(cameras[slot.camera].rays[slot.part]));
+  }
   SweepRequest request;
   request.camera_peaks = options_.camera_maps && rays.size() == cameras.size();
   request.sink = sink;
   request.groups = layout.groups;
   const DepthExtractionOptions& extraction = options_.extraction;
-  if (usesColumns(extraction.extraction)) request.column_window = extraction.threshold_kernel;
+  if (extraction.extraction == ExtractionMethod::kAggregated) {
+    request.column_window = extraction.threshold_kernel;
+  }
   return sweepSpace(std::move(rays), {view_, planes_}, options_.sweep, request);
 }
 
@@ -290,7 +266,7 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink
 void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                              KeyframeDepthMap& keyframe) const {
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
-  keyframe.max_confidence = maximumOf(swept.fused.peaks.confidence);
+  cv::minMaxLoc(swept.fused.peaks.confidence, nullptr, &keyframe.max_confidence);
   RobustMaximum running_maximum = sequence_maximum_;
   running_maximum.add(keyframe.max_confidence);
   KeyframeFacts facts{{}, keyframe.parallax_px_m};

@@ -35,13 +35,6 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
                   const Trajectory& trajectory, const EventGroups& groups,
                   const PosePacketsOptions& packets);
 
-/// Counts the events of all cameras of a keyframe.
-void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe);
-/// Removes the cameras without rays, unless no camera has any.
-void removeSilent(std::vector<WindowRays>& cameras);
-/// The inputs of the fusion; consumes the cameras' rays.
-std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout);
-
 /// A window that is mapped with correction of its motion. Owns nothing.
 struct CorrectedWindow {
   const WindowInput& input;
@@ -119,7 +112,6 @@ class KeyframeMapper {
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageHook* stages) const;
-  std::vector<WindowRays> raysOfCameras(const WindowInput& input, const Trajectory& motion) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                KeyframeDepthMap& keyframe) const;

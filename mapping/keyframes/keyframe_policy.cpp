@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option.h"
+#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
@@ -106,7 +107,6 @@ class EventsPolicy : public KeyframePolicy {
     next_ns_ = window.t1_ns;
     counted_events_ = 0;
   }
-  std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
   std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
     const std::int64_t from_ns = earliestStart(recording);
     if (t_ns <= from_ns) return 0;
@@ -127,6 +127,153 @@ class EventsPolicy : public KeyframePolicy {
   std::int64_t counted_events_ = 0;
 };
 
+constexpr int kGridSide = 10;
+
+/// A grid of points over the image of a view, all at one depth.
+std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid3& T_world_ref,
+                                          double depth_m) {
+  std::vector<Eigen::Vector3d> points;
+  for (int j = 0; j < kGridSide; ++j) {
+    for (int i = 0; i < kGridSide; ++i) {
+      const double x = (i + 0.5) / kGridSide * (view.width - 1);
+      const double y = (j + 0.5) / kGridSide * (view.height - 1);
+      points.push_back(T_world_ref * view.pointAt(x, y, depth_m));
+    }
+  }
+  return points;
+}
+
+double visibleFraction(const std::vector<Eigen::Vector3d>& points_world, const Rigid3& T_world_ref,
+                       const ReferenceView& view) {
+  const Rigid3 T_ref_world = T_world_ref.inverse();
+  const auto in_view = [&](const Eigen::Vector3d& p_world) {
+    const Eigen::Vector3d p_ref = T_ref_world * p_world;
+    if (!(p_ref.z() > 0)) return false;
+    const Eigen::Vector2d pixel = view.project(p_ref);
+    return pixel.x() >= 0 && pixel.x() <= view.width - 1 && pixel.y() >= 0 &&
+           pixel.y() <= view.height - 1;
+  };
+  const auto count = std::count_if(points_world.begin(), points_world.end(), in_view);
+  return static_cast<double>(count) / static_cast<double>(points_world.size());
+}
+
+/// A window starts with the first event after the previous window and grows, stride by stride,
+/// until one of two conditions holds:
+/// - the reference camera has moved by a fraction of the scene's mean depth since the window's
+///   start;
+/// - too few points of the last keyframe are in view. Without such points, a grid of points at the
+///   mean depth replaces them.
+/// So a keyframe has enough parallax at any speed (Rebecq et al., IJCV 2018, Sec. 7).
+///
+/// If the longest window is not enough, its start moves on by a stride: the events of a camera at
+/// rest are in no window.
+class BaselinePolicy : public KeyframePolicy {
+ public:
+  BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m)
+      : options_(options),
+        window_ns_(durationFromSeconds(options.window_s)),
+        stride_ns_(durationFromSeconds(options.stride_s)),
+        mean_depth_m_(depth_guess_m),
+        duration_ns_(stride_ns_) {}
+
+  std::optional<Window> current(const RecordingProgress& recording) override {
+    while (true) {
+      const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
+      if (!t0_ns) return std::nullopt;
+      const auto T_world_ref0 = recording.viewPoseAt(*t0_ns);
+      for (; T_world_ref0 && duration_ns_ <= window_ns_; duration_ns_ += stride_ns_) {
+        const std::int64_t t1_ns = *t0_ns + duration_ns_;
+        if (t1_ns > recording.completeNs()) return std::nullopt;
+        const auto T_world_ref1 = recording.viewPoseAt(t1_ns);
+        if (T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
+          return windowOf(*t0_ns, t1_ns, options_.reference);
+        }
+      }
+      startAt(*t0_ns + stride_ns_);
+    }
+  }
+  /// Grows from the end back, stride by stride.
+  std::optional<Window> last(const RecordingProgress& recording,
+                             std::int64_t end_ns) const override {
+    const auto first_ns = recording.timeOfEvent(earliestStart(recording), 1);
+    if (!first_ns || *first_ns >= end_ns) return std::nullopt;
+    const auto T_world_ref1 = recording.viewPoseAt(end_ns - 1);  // of the last event
+    std::int64_t t0_ns = std::min(*first_ns, end_ns - stride_ns_);
+    for (; t0_ns >= recording.startNs() && end_ns - t0_ns <= window_ns_; t0_ns -= stride_ns_) {
+      const auto T_world_ref0 = recording.viewPoseAt(t0_ns);
+      if (T_world_ref0 && T_world_ref1 &&
+          isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
+        if (end_ns - *first_ns < (end_ns - t0_ns) * kLeastAdded) break;
+        return windowOf(t0_ns, end_ns, options_.reference);
+      }
+    }
+    return std::nullopt;
+  }
+  std::int64_t earliestLast(const RecordingProgress& recording) const override {
+    return earliestStart(recording) - window_ns_;
+  }
+  std::int64_t earliestStart(const RecordingProgress& recording) const override {
+    return next_ns_.value_or(recording.startNs());
+  }
+  void advance(const Window& window, const KeyframeDepthMap* keyframe) override {
+    constexpr std::size_t kMaxSeenPoints = 500;  // or so, spread over the image
+    startAt(window.t1_ns);
+    counted_until_ns_ = kMinTimeNs;
+    if (keyframe == nullptr) return;
+    // Also if the keyframe has no points: points of an older one, out of view by now, would end
+    // every window after one stride, too early for new points.
+    seen_world_.clear();
+    std::vector<cv::Point> pixels;
+    cv::findNonZero(keyframe->map.depth > 0, pixels);
+    const std::size_t every = pixels.size() / kMaxSeenPoints + 1;
+    double mean_depth_m = 0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const double depth_m = keyframe->map.depth(pixels[i]);
+      mean_depth_m += depth_m / static_cast<double>(pixels.size());
+      if (i % every != 0) continue;
+      seen_world_.push_back(keyframe->T_world_ref *
+                            keyframe->view.pointAt(pixels[i].x, pixels[i].y, depth_m));
+    }
+    if (!pixels.empty()) mean_depth_m_ = mean_depth_m;
+  }
+  std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
+    const std::int64_t from_ns = earliestStart(recording);
+    if (t_ns <= from_ns) return 0;
+    startAt(t_ns);
+    const std::int64_t uncounted_ns = std::max(from_ns, counted_until_ns_);
+    if (t_ns <= uncounted_ns || recording.eventsIn(from_ns, t_ns) == 0) return 0;
+    // Nobody knows the windows that would have come: the longest ones are assumed.
+    const std::int64_t windows = (t_ns - uncounted_ns - 1) / window_ns_ + 1;
+    counted_until_ns_ = uncounted_ns + windows * window_ns_;
+    return static_cast<std::uint64_t>(windows);
+  }
+
+ private:
+  bool isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,
+                const ReferenceView& view) const {
+    const double baseline_m = (T_world_ref1.translation - T_world_ref0.translation).norm();
+    if (baseline_m >= options_.min_baseline_ratio * mean_depth_m_) return true;
+    const double fraction =
+        seen_world_.empty()
+            ? visibleFraction(pointsAcross(view, T_world_ref0, mean_depth_m_), T_world_ref1, view)
+            : visibleFraction(seen_world_, T_world_ref1, view);
+    return fraction < options_.min_visible_fraction;
+  }
+  void startAt(std::int64_t t_ns) {
+    next_ns_ = t_ns;
+    duration_ns_ = stride_ns_;
+  }
+
+  KeyframePolicyOptions options_;
+  std::int64_t window_ns_;
+  std::int64_t stride_ns_;
+  double mean_depth_m_;
+  std::vector<Eigen::Vector3d> seen_world_;     // points of the last keyframe
+  std::optional<std::int64_t> next_ns_;         // earliest start of the next window
+  std::int64_t duration_ns_;                    // the next candidate
+  std::int64_t counted_until_ns_ = kMinTimeNs;  // by the windows that were given up
+};
+
 class SingleWindowPolicy : public KeyframePolicy {
  public:
   explicit SingleWindowPolicy(const Window& window) : window_(window) {}
@@ -134,9 +281,6 @@ class SingleWindowPolicy : public KeyframePolicy {
   std::optional<Window> current(const RecordingProgress&) override { return window_; }
   std::optional<Window> last(const RecordingProgress&, std::int64_t) const override {
     return std::nullopt;
-  }
-  std::int64_t earliestLast(const RecordingProgress& recording) const override {
-    return earliestStart(recording);
   }
   std::int64_t earliestStart(const RecordingProgress&) const override {
     return window_ ? window_->t0_ns : kMaxTimeNs;
@@ -196,145 +340,6 @@ std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& 
 
 std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window) {
   return std::make_unique<SingleWindowPolicy>(window);
-}
-
-namespace {
-
-constexpr std::size_t kMaxSeenPoints = 500;
-constexpr int kGridSide = 10;
-
-/// A grid of points over the image of a view, all at one depth.
-std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid3& T_world_ref,
-                                          double depth_m) {
-  std::vector<Eigen::Vector3d> points;
-  for (int j = 0; j < kGridSide; ++j) {
-    for (int i = 0; i < kGridSide; ++i) {
-      const double x = (i + 0.5) / kGridSide * (view.width - 1);
-      const double y = (j + 0.5) / kGridSide * (view.height - 1);
-      points.push_back(T_world_ref * view.pointAt(x, y, depth_m));
-    }
-  }
-  return points;
-}
-
-double visibleFraction(const std::vector<Eigen::Vector3d>& points_world, const Rigid3& T_world_ref,
-                       const ReferenceView& view) {
-  const Rigid3 T_ref_world = T_world_ref.inverse();
-  const auto in_view = [&](const Eigen::Vector3d& p_world) {
-    const Eigen::Vector3d p_ref = T_ref_world * p_world;
-    if (!(p_ref.z() > 0)) return false;
-    const Eigen::Vector2d pixel = view.project(p_ref);
-    return pixel.x() >= 0 && pixel.x() <= view.width - 1 && pixel.y() >= 0 &&
-           pixel.y() <= view.height - 1;
-  };
-  const auto count = std::count_if(points_world.begin(), points_world.end(), in_view);
-  return static_cast<double>(count) / static_cast<double>(points_world.size());
-}
-
-struct SeenPoints {
-  double mean_depth_m = 0;
-  std::vector<Eigen::Vector3d> points_world;  ///< At most 500 or so, spread over the image.
-};
-
-SeenPoints pointsOf(const KeyframeDepthMap& keyframe) {
-  std::vector<cv::Point> pixels;
-  cv::findNonZero(keyframe.map.depth > 0, pixels);
-  SeenPoints seen;
-  const std::size_t every = pixels.size() / kMaxSeenPoints + 1;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const double depth_m = keyframe.map.depth(pixels[i]);
-    seen.mean_depth_m += depth_m / static_cast<double>(pixels.size());
-    if (i % every != 0) continue;
-    seen.points_world.push_back(keyframe.T_world_ref *
-                                keyframe.view.pointAt(pixels[i].x, pixels[i].y, depth_m));
-  }
-  return seen;
-}
-
-}  // namespace
-
-BaselinePolicy::BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m)
-    : options_(options),
-      window_ns_(durationFromSeconds(options.window_s)),
-      stride_ns_(durationFromSeconds(options.stride_s)),
-      mean_depth_m_(depth_guess_m),
-      duration_ns_(stride_ns_) {}
-
-void BaselinePolicy::startAt(std::int64_t t_ns) {
-  next_ns_ = t_ns;
-  duration_ns_ = stride_ns_;
-}
-
-std::optional<Window> BaselinePolicy::current(const RecordingProgress& recording) {
-  while (true) {
-    const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
-    if (!t0_ns) return std::nullopt;
-    const auto T_world_ref0 = recording.viewPoseAt(*t0_ns);
-    for (; T_world_ref0 && duration_ns_ <= window_ns_; duration_ns_ += stride_ns_) {
-      const std::int64_t t1_ns = *t0_ns + duration_ns_;
-      if (t1_ns > recording.completeNs()) return std::nullopt;
-      const auto T_world_ref1 = recording.viewPoseAt(t1_ns);
-      if (T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
-        return windowOf(*t0_ns, t1_ns, options_.reference);
-      }
-    }
-    startAt(*t0_ns + stride_ns_);
-  }
-}
-
-std::optional<Window> BaselinePolicy::last(const RecordingProgress& recording,
-                                           std::int64_t end_ns) const {
-  const auto first_ns = recording.timeOfEvent(earliestStart(recording), 1);
-  if (!first_ns || *first_ns >= end_ns) return std::nullopt;
-  const auto T_world_ref1 = recording.viewPoseAt(end_ns - 1);  // of the last event
-  std::int64_t t0_ns = std::min(*first_ns, end_ns - stride_ns_);
-  for (; t0_ns >= recording.startNs() && end_ns - t0_ns <= window_ns_; t0_ns -= stride_ns_) {
-    const auto T_world_ref0 = recording.viewPoseAt(t0_ns);
-    if (T_world_ref0 && T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
-      if (end_ns - *first_ns < (end_ns - t0_ns) * KeyframePolicy::kLeastAdded) break;
-      return windowOf(t0_ns, end_ns, options_.reference);
-    }
-  }
-  return std::nullopt;
-}
-
-bool BaselinePolicy::isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,
-                              const ReferenceView& view) const {
-  const double baseline_m = (T_world_ref1.translation - T_world_ref0.translation).norm();
-  if (baseline_m >= options_.min_baseline_ratio * mean_depth_m_) return true;
-  const double fraction =
-      seen_world_.empty()
-          ? visibleFraction(pointsAcross(view, T_world_ref0, mean_depth_m_), T_world_ref1, view)
-          : visibleFraction(seen_world_, T_world_ref1, view);
-  return fraction < options_.min_visible_fraction;
-}
-
-std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) const {
-  return next_ns_.value_or(recording.startNs());
-}
-
-std::uint64_t BaselinePolicy::dropWindowsBefore(const RecordingProgress& recording,
-                                                std::int64_t t_ns) {
-  const std::int64_t from_ns = earliestStart(recording);
-  if (t_ns <= from_ns) return 0;
-  startAt(t_ns);
-  const std::int64_t uncounted_ns = std::max(from_ns, counted_until_ns_);
-  if (t_ns <= uncounted_ns || recording.eventsIn(from_ns, t_ns) == 0) return 0;
-  // Nobody knows the windows that would have come: the longest ones are assumed.
-  const std::int64_t windows = (t_ns - uncounted_ns - 1) / window_ns_ + 1;
-  counted_until_ns_ = uncounted_ns + windows * window_ns_;
-  return static_cast<std::uint64_t>(windows);
-}
-
-void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyframe) {
-  startAt(window.t1_ns);
-  counted_until_ns_ = kMinTimeNs;
-  if (keyframe == nullptr) return;
-  SeenPoints seen = pointsOf(*keyframe);
-  if (!seen.points_world.empty()) mean_depth_m_ = seen.mean_depth_m;
-  // Also if the keyframe has no points: points of an older one, out of view by now, would end every
-  // window after one stride, too early for new points.
-  seen_world_ = std::move(seen.points_world);
 }
 
 }  // namespace efm

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string_view>
-#include <vector>
 
 #include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rigid3.h"
-#include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 
 namespace efm {
@@ -109,7 +105,9 @@ class KeyframePolicy {
   virtual std::optional<Window> last(const RecordingProgress& recording,
                                      std::int64_t end_ns) const = 0;
   /// `last` needs no events before this time.
-  virtual std::int64_t earliestLast(const RecordingProgress& recording) const = 0;
+  virtual std::int64_t earliestLast(const RecordingProgress& recording) const {
+    return earliestStart(recording);
+  }
   /// No later window needs events before this time, or poses before `earliestReference`.
   virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
   virtual std::int64_t earliestReference(const RecordingProgress& recording) const {
@@ -119,9 +117,9 @@ class KeyframePolicy {
   /// @param keyframe of the current window; null if there is none.
   virtual void advance(const Window& window, const KeyframeDepthMap* keyframe) = 0;
   /// Skips the windows that end by `t_ns`: they have no events. Cost does not depend on their
-  /// number.
+  /// number. None is skipped where every window has events.
   /// @return the number of skipped windows.
-  virtual std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) = 0;
+  virtual std::uint64_t advancePast(const RecordingProgress&, std::int64_t) { return 0; }
   /// Gives up the windows that begin before `t_ns`. @return their number. Where the ends of windows
   /// depend on data, which may be missing, it is the number that the events before `t_ns` would
   /// have filled. A window that is given up piece by piece counts once.
@@ -134,47 +132,5 @@ std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& 
                                                    double depth_guess_m);
 /// This window alone, whether the recording fills it or not.
 std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window);
-
-/// A window starts with the first event after the previous window and grows, stride by stride,
-/// until one of two conditions holds:
-/// - the reference camera has moved by a fraction of the scene's mean depth since the window's
-///   start;
-/// - too few points of the last keyframe are in view. Without such points, a grid of points at the
-///   mean depth replaces them.
-/// So a keyframe has enough parallax at any speed (Rebecq et al., IJCV 2018, Sec. 7).
-///
-/// If the longest window is not enough, its start moves on by a stride: the events of a camera at
-/// rest are in no window.
-class BaselinePolicy : public KeyframePolicy {
- public:
-  BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m);
-
-  std::optional<Window> current(const RecordingProgress& recording) override;
-  /// Grows from the end back, stride by stride.
-  std::optional<Window> last(const RecordingProgress& recording,
-                             std::int64_t end_ns) const override;
-  std::int64_t earliestLast(const RecordingProgress& recording) const override {
-    return earliestStart(recording) - window_ns_;
-  }
-  std::int64_t earliestStart(const RecordingProgress& recording) const override;
-  void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
-  /// Every window has events: none is skipped.
-  std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
-  std::uint64_t dropWindowsBefore(const RecordingProgress& recording, std::int64_t t_ns) override;
-
- private:
-  bool isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,
-                const ReferenceView& view) const;
-  void startAt(std::int64_t t_ns);
-
-  KeyframePolicyOptions options_;
-  std::int64_t window_ns_;
-  std::int64_t stride_ns_;
-  double mean_depth_m_;
-  std::vector<Eigen::Vector3d> seen_world_;     // points of the last keyframe
-  std::optional<std::int64_t> next_ns_;         // earliest start of the next window
-  std::int64_t duration_ns_;                    // the next candidate
-  std::int64_t counted_until_ns_ = kMinTimeNs;  // by the windows that were given up
-};
 
 }  // namespace efm

@@ -184,10 +184,10 @@ TEST(BaselinePolicy, RotationEndsAWindowOnceTooFewPointsAreInView) {
     });
     const bool sideways = rad_s.x() == 0;
     for (const bool by_the_keyframe : {false, true}) {  // or by the guess
-      BaselinePolicy policy(turning, kDepthGuess_m);
+      const auto policy = makeKeyframePolicy(turning, kDepthGuess_m);
       if (by_the_keyframe)
-        policy.advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
-      const auto window = policy.current(recording);
+        policy->advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
+      const auto window = policy->current(recording);
       ASSERT_TRUE(window);
       // 30 of 100 columns have left after atan(0.495) - atan(0.195) = 0.267 rad, four of the
       // guess's ten after atan(0.495) - atan(0.1485) = 0.312; of 80 rows 24 after 0.222 rad, and
@@ -199,7 +199,7 @@ TEST(BaselinePolicy, RotationEndsAWindowOnceTooFewPointsAreInView) {
       EXPECT_LT(angle, least + 0.011) << rad_s.transpose();
     }
     turning.min_visible_fraction = 0;
-    EXPECT_FALSE(BaselinePolicy(turning, kDepthGuess_m).current(recording)) << "it may all go";
+    EXPECT_FALSE(makeKeyframePolicy(turning, kDepthGuess_m)->current(recording)) << "it may all go";
     turning.min_visible_fraction = 0.7;
   }
 }
@@ -212,27 +212,27 @@ TEST(BaselinePolicy, StandingStillAllOfAWideOrATallViewStaysInIt) {
     seen.view = recording.image;
     seen.map.depth = cv::Mat1f(size, 2.0F);
     for (const bool by_the_keyframe : {false, true}) {  // or by the guess
-      BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+      const auto policy = makeKeyframePolicy(options(1.0, 0.05), kDepthGuess_m);
       if (by_the_keyframe)
-        policy.advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
-      EXPECT_FALSE(policy.current(recording)) << size;
+        policy->advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
+      EXPECT_FALSE(policy->current(recording)) << size;
     }
   }
 }
 
 TEST(BaselinePolicy, RestAfterARotationMakesOneKeyframeNotOnePerStride) {
-  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  const auto policy = makeKeyframePolicy(options(1.0, 0.05), kDepthGuess_m);
   const KeyframeDepthMap seen = keyframeThatSaw(2);
-  policy.advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
+  policy->advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
   // The camera looks away from these points and is at rest: there is nothing to triangulate.
   const auto recording = recordingOf([](std::int64_t) { return turned(3.1); });
-  const auto window = policy.current(recording);
+  const auto window = policy->current(recording);
   ASSERT_TRUE(window);
   EXPECT_EQ(window->t1_ns, kBaselineStart_ns + 50 * kMs) << "one stride is enough";
   const KeyframeDepthMap saw_nothing = keyframeThatSaw(0);
-  policy.advance(*window, &saw_nothing);
-  EXPECT_FALSE(policy.current(recording));
-  EXPECT_GT(policy.earliestStart(recording), kBaselineStart_ns + 2900 * kMs)
+  policy->advance(*window, &saw_nothing);
+  EXPECT_FALSE(policy->current(recording));
+  EXPECT_GT(policy->earliestStart(recording), kBaselineStart_ns + 2900 * kMs)
       << "its events are let go";
 }
 
@@ -241,12 +241,12 @@ TEST(BaselinePolicy, ALastWindowOfWhichLittleIsNewIsLeftOut) {
   const auto moving = recordingOf([](std::int64_t t_ns) {
     return Rigid3{Eigen::Quaterniond::Identity(), {0.9 * secondsSinceStart(t_ns), 0, 0}};
   });
-  BaselinePolicy policy(options(0.3, 0.05), kDepthGuess_m);
-  policy.advance(*policy.current(moving), nullptr);  // [0, 0.25)
-  EXPECT_FALSE(policy.last(moving, kBaselineStart_ns + 250 * kMs)) << "all events are in a window";
-  EXPECT_FALSE(policy.last(moving, kBaselineStart_ns + 274 * kMs)) << "less than a tenth";
-  EXPECT_TRUE(policy.last(moving, kBaselineStart_ns + 276 * kMs));
-  EXPECT_EQ(policy.earliestLast(moving), kBaselineStart_ns - 50 * kMs);
+  const auto policy = makeKeyframePolicy(options(0.3, 0.05), kDepthGuess_m);
+  policy->advance(*policy->current(moving), nullptr);  // [0, 0.25)
+  EXPECT_FALSE(policy->last(moving, kBaselineStart_ns + 250 * kMs)) << "all events are in a window";
+  EXPECT_FALSE(policy->last(moving, kBaselineStart_ns + 274 * kMs)) << "less than a tenth";
+  EXPECT_TRUE(policy->last(moving, kBaselineStart_ns + 276 * kMs));
+  EXPECT_EQ(policy->earliestLast(moving), kBaselineStart_ns - 50 * kMs);
 }
 
 }  // namespace
