@@ -16,11 +16,6 @@ constexpr double kMotionS = 0.5;  // the camera sees parallax
 constexpr std::size_t kMinPixels = 200;
 constexpr double kWithin = 1.15;
 
-FusionMapperOptions withCamera(FusionMapperOptions options, int camera) {
-  options.cameras = {camera};
-  return options;
-}
-
 /// Appends the ratios of the pixels that both maps have.
 void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
                   std::vector<double>& ratios) {
@@ -47,7 +42,9 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const FusionMapperOptions& options) {
   if (selectedCameras(rig, options.cameras).size() < 2) return std::nullopt;
   CoarseSweep rig_sweep(rig, options);
-  CoarseSweep motion_sweep(rig, withCamera(options, options.keyframe.reference_camera));
+  FusionMapperOptions reference = options;
+  reference.cameras = {options.keyframe.reference_camera};
+  CoarseSweep motion_sweep(rig, reference);
   std::vector<double> ratios;
   for (const WindowSample& sample : samples) {
     const auto by_rig = rig_sweep.map(middleOf(sample, kRigS));

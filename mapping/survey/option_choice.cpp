@@ -166,11 +166,6 @@ void chooseWindow(const std::vector<WindowSample>& samples, const Rig& rig,
   choice.window(window_s, reason);
 }
 
-double lengthOf(const FusionMapperOptions& options) {
-  const auto& window = options.only_window;
-  return window ? secondsBetween(window->t0_ns, window->t1_ns) : options.policy.window_s;
-}
-
 void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choice) {
   const InverseRange scene = denseRange(depths);
   const InverseRange limits = limitsAround(scene);
@@ -260,16 +255,14 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
     return choice.withoutScene(given.min_depth_m, given.max_depth_m,
                                "the default: a coarse sweep found no scene");
   }
-  if (!options.only_window) {
-    chooseWindow(samples, rig, options, depths, duration_s, choice);
-  }
-  const double window_s = lengthOf(options);
+  if (!options.only_window) chooseWindow(samples, rig, options, depths, duration_s, choice);
+  const auto& window = options.only_window;
+  const double window_s =
+      window ? secondsBetween(window->t0_ns, window->t1_ns) : options.policy.window_s;
   const double parallax_px_m = parallaxIn(samples, window_s, rig, options);
   depths = sceneDepths(sweep, samples, window_s);
   if (!is_proven) addFarthest(depths);
-  if (!depths.inverse.empty()) {
-    chooseDepths(depths, parallax_px_m, choice);
-  }
+  if (!depths.inverse.empty()) chooseDepths(depths, parallax_px_m, choice);
   const DepthPlanesOptions& planes = options.keyframe.planes;
   choice.planes(
       automaticPlanes(planes, parallax_px_m),

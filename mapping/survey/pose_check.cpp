@@ -12,26 +12,6 @@
 #include "mapping/survey/depth_agreement.h"
 
 namespace efm {
-namespace {
-
-/// All 23 rotations other than none that map axes to axes.
-std::vector<Eigen::Matrix3d> axisRotations() {
-  std::vector<Eigen::Matrix3d> rotations;
-  std::array<int, 3> order{0, 1, 2};
-  do {
-    for (unsigned signs = 0; signs < 8; ++signs) {
-      Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
-      for (int row = 0; row < 3; ++row) {
-        rotation(row, order[static_cast<std::size_t>(row)]) = (signs >> row) % 2 == 0 ? 1 : -1;
-      }
-      if (rotation.determinant() > 0 && !rotation.isIdentity()) rotations.push_back(rotation);
-    }
-  } while (std::next_permutation(order.begin(), order.end()));
-  return rotations;
-}
-
-}  // namespace
-
 std::vector<PoseHypothesis> poseHypotheses() {
   std::vector<PoseHypothesis> all;
   all.push_back({PoseMistake::kInverted, [](const Rigid3& pose) { return pose.inverse(); }});
@@ -39,11 +19,20 @@ std::vector<PoseHypothesis> poseHypotheses() {
                    const Eigen::Quaterniond& q = pose.rotation;
                    return Rigid3{{q.x(), q.y(), q.z(), q.w()}, pose.translation};
                  }});
-  for (const Eigen::Matrix3d& rotation : axisRotations()) {
-    const Rigid3 T_body_rig{Eigen::Quaterniond(rotation), Eigen::Vector3d::Zero()};
-    all.push_back({PoseMistake::kAxes,
-                   [T_body_rig](const Rigid3& pose) { return pose * T_body_rig; }, rotation});
-  }
+  // All 23 rotations other than none that map axes to axes.
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
+      for (int row = 0; row < 3; ++row) {
+        rotation(row, order[static_cast<std::size_t>(row)]) = (signs >> row) % 2 == 0 ? 1 : -1;
+      }
+      if (rotation.determinant() < 0 || rotation.isIdentity()) continue;
+      const Rigid3 T_body_rig{Eigen::Quaterniond(rotation), Eigen::Vector3d::Zero()};
+      all.push_back({PoseMistake::kAxes,
+                     [T_body_rig](const Rigid3& pose) { return pose * T_body_rig; }, rotation});
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
   return all;
 }
 
@@ -76,13 +65,6 @@ constexpr double kMinShiftM = 0.005;  // within a piece; as the warning `no-moti
 constexpr double kMaxTimeShiftS = 0.5;
 constexpr double kTimeStepS = 0.05;
 constexpr double kFinestTimeStepS = 0.003;  // measured: a peak is found to 1 to 6 ms
-
-/// The rig with the other transform between its first two cameras.
-Rig withInvertedStereo(Rig rig) {
-  const Rigid3 T_cam0_cam1 = rig.cameras[0].T_rig_cam.inverse() * rig.cameras[1].T_rig_cam;
-  rig.cameras[1].T_rig_cam = rig.cameras[0].T_rig_cam * T_cam0_cam1.inverse();
-  return rig;
-}
 
 /// Gains of one hypothesis over the poses as they are: a logarithm per piece.
 struct Gains {
@@ -176,7 +158,10 @@ class PoseCheck {
     }
     Candidate inverted;
     inverted.finding.mistake = PoseMistake::kStereoInverted;
-    EventSharpness sharpness(withInvertedStereo(rig_), options_);
+    Rig rig = rig_;
+    const Rigid3 T_cam0_cam1 = rig.cameras[0].T_rig_cam.inverse() * rig.cameras[1].T_rig_cam;
+    rig.cameras[1].T_rig_cam = rig.cameras[0].T_rig_cam * T_cam0_cam1.inverse();
+    EventSharpness sharpness(rig, options_);
     compare([&](const SamplePiece& piece) { return sharpness.of(piece, piece.trajectory); },
             inverted, 1);
     candidates_.push_back(inverted);
@@ -240,30 +225,25 @@ class PoseCheck {
   }
 
   std::optional<PoseFinding> best() const {
-    const Candidate* found = nullptr;
     double best_gain = 1;
     for (const Candidate& candidate : candidates_) {
-      if (isClear(candidate)) best_gain = std::max(best_gain, gainOf(candidate));
+      if (isClear(candidate)) best_gain = std::max(best_gain, candidate.gains.mean());
     }
+    std::optional<PoseFinding> finding;
     for (const Candidate& candidate : candidates_) {
-      if (gainOf(candidate) < kEqual * best_gain || !isClear(candidate)) continue;
-      found = &candidate;  // the simplest one comes first
-      break;
-    }
-    if (!found) return unexplained();
-    PoseFinding finding = found->finding;
-    finding.gain = gainOf(*found);
-    for (const Candidate& candidate : candidates_) {
+      if (candidate.gains.mean() < kEqual * best_gain || !isClear(candidate)) continue;
       const PoseMistake other = candidate.finding.mistake;
-      if (gainOf(candidate) < kEqual * best_gain || other == finding.mistake) continue;
-      if (!isClear(candidate)) continue;
-      auto& alternatives = finding.alternatives;
-      if (alternatives.empty() || alternatives.back() != other) alternatives.push_back(other);
+      if (!finding) {  // the simplest one comes first
+        finding = candidate.finding;
+        finding->gain = candidate.gains.mean();
+      } else if (other != finding->mistake) {
+        auto& alternatives = finding->alternatives;
+        if (alternatives.empty() || alternatives.back() != other) alternatives.push_back(other);
+      }
     }
-    return finding;
+    return finding ? finding : unexplained();
   }
 
-  static double gainOf(const Candidate& candidate) { return candidate.gains.mean(); }
   bool isClear(const Candidate& candidate) const {
     const bool time = candidate.finding.mistake == PoseMistake::kTimeShift;
     const double min_shift_gain = severalCameras() ? kMinShiftGain : kMinShiftGainOfOne;
@@ -272,8 +252,9 @@ class PoseCheck {
     const bool short_one = !severalCameras() && seenS() < kShortS;
     double min_gain = time ? min_shift_gain : kMinGain;
     if (short_one && (!time || shift_s > kMaxLatencyS)) min_gain = kMinGainOfShort;
-    return gainOf(candidate) >= min_gain && candidate.gains.agree(min_gain) &&
-           gainOf(candidate) >= (time ? kMinShiftDistinction : kMinDistinction) * typical_wrong_;
+    return candidate.gains.mean() >= min_gain && candidate.gains.agree(min_gain) &&
+           candidate.gains.mean() >=
+               (time ? kMinShiftDistinction : kMinDistinction) * typical_wrong_;
   }
   /// The time from the first to the last event of all pieces.
   double seenS() const {

@@ -62,12 +62,6 @@ namespace {
 constexpr double kPieceS = 0.5;
 constexpr std::size_t kPieces = 4;
 
-std::vector<std::vector<Event>> thinned(const std::vector<EventSpan>& events) {
-  std::vector<std::vector<Event>> all;
-  for (const EventSpan& span : events) all.push_back(chosenEvenly(span, kMaxPieceEvents));
-  return all;
-}
-
 /// One pose instead of those of 20 ms, their mean: the jitter of a tracker is no mistake that is
 /// looked for.
 Trajectory withoutJitter(const Trajectory& trajectory, const TrajectoryOptions& options) {
@@ -127,7 +121,10 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
       const auto t0_ns = begin_ns + (whole_ns - length_ns) * static_cast<std::int64_t>(2 * i + 1) /
                                         static_cast<std::int64_t>(2 * of_each);
       const Window window{t0_ns, t0_ns + length_ns, t0_ns + length_ns / 2};
-      pieces.push_back({window, thinned(eventsWithin(sample, window)), trajectory});
+      SamplePiece& piece = pieces.emplace_back(SamplePiece{window, {}, trajectory});
+      for (const EventSpan& events : eventsWithin(sample, window)) {
+        piece.events.push_back(chosenEvenly(events, kMaxPieceEvents));
+      }
     }
   }
   // Evenly spread; those in the middle first: they have poses for most time shifts.
