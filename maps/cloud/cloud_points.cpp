@@ -15,32 +15,14 @@
 
 namespace efm {
 
+namespace {
+
+/// For messages, with all digits: "(1, 2.5, -3)".
 std::string positionText(const CloudPoint& point) {
   NumberText text;
   text << "(" << point.p_world.x() << ", " << point.p_world.y() << ", " << point.p_world.z() << ")";
   return text.str();
 }
-
-std::string pointText(const CloudPoint& point) {
-  NumberText text;
-  text << positionText(point) << " with confidence " << point.confidence;
-  return text.str();
-}
-
-std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
-                                       const OutlierRemovalOptions& options) {
-  options.validate();
-  if (options.outlier_radius_m == 0 || points.empty()) return points;
-  const auto offsets = offsetsFrom(medianPosition(points), points);
-  std::vector<CloudPoint> inliers;
-  for (const std::size_t index :
-       indicesWithNeighbors(offsets, options.outlier_radius_m, options.outlier_min_neighbors)) {
-    inliers.push_back(points[index]);
-  }
-  return inliers;
-}
-
-namespace {
 
 void requireFinite(const CloudPoint& point) {
   if (point.p_world.allFinite()) return;
@@ -55,6 +37,27 @@ pcl::PointCloud<pcl::PointXYZ>::Ptr pclCloudOf(const std::vector<Eigen::Vector3f
 }
 
 }  // namespace
+
+std::string pointText(const CloudPoint& point) {
+  NumberText text;
+  text << positionText(point) << " with confidence " << point.confidence;
+  return text.str();
+}
+
+std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
+                                       const OutlierRemovalOptions& options) {
+  options.validate();
+  if (options.outlier_radius_m == 0 || points.empty()) return points;
+  pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
+  filter.setInputCloud(pclCloudOf(offsetsFrom(medianPosition(points), points)));
+  filter.setRadiusSearch(options.outlier_radius_m);
+  filter.setMinNeighborsInRadius(options.outlier_min_neighbors);
+  pcl::Indices kept;
+  filter.filter(kept);  // ascending
+  std::vector<CloudPoint> inliers;
+  for (const pcl::index_t index : kept) inliers.push_back(points[static_cast<std::size_t>(index)]);
+  return inliers;
+}
 
 Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points) {
   for (const CloudPoint& point : points) requireFinite(point);
@@ -98,17 +101,6 @@ PointTree::Neighbor PointTree::nearest(const Eigen::Vector3f& point) const {
   std::vector<float> squared_distance(1);
   tree_->flann.nearestKSearch({point.x(), point.y(), point.z()}, 1, index, squared_distance);
   return {static_cast<std::size_t>(index.front()), squared_distance.front()};
-}
-
-std::vector<std::size_t> indicesWithNeighbors(const std::vector<Eigen::Vector3f>& points,
-                                              double radius, int min_neighbors) {
-  pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(pclCloudOf(points));
-  filter.setRadiusSearch(radius);
-  filter.setMinNeighborsInRadius(min_neighbors);
-  pcl::Indices kept;
-  filter.filter(kept);  // ascending
-  return {kept.begin(), kept.end()};
 }
 
 }  // namespace efm

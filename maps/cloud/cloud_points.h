@@ -26,8 +26,6 @@ struct CloudPoint {
   float sigma = std::numeric_limits<float>::quiet_NaN();
 };
 
-/// For messages, with all digits: "(1, 2.5, -3)".
-std::string positionText(const CloudPoint& point);
 /// For messages, with all digits: "(1, 2.5, -3) with confidence 7".
 std::string pointText(const CloudPoint& point);
 
@@ -86,9 +84,5 @@ class PointTree {
   struct Tree;
   std::unique_ptr<Tree> tree_;
 };
-
-/// The ascending indices of the points that have at least `min_neighbors` others within the radius.
-std::vector<std::size_t> indicesWithNeighbors(const std::vector<Eigen::Vector3f>& points,
-                                              double radius, int min_neighbors);
 
 }  // namespace efm

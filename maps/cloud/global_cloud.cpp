@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "mapping/base/option.h"
@@ -26,6 +25,17 @@ namespace {
 /// Bits for the keyframes with lower numbers; as many for those with higher ones.
 constexpr unsigned kLowerBits = GlobalCloud::kMaxNumberDifference;
 
+void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) {
+  if (keyframe >= from) return;
+  throw std::invalid_argument("keyframe " + std::to_string(keyframe) +
+                              ": the keyframes around it are merged for good");
+}
+
+/// The first number of `SettledVoxel::recent`.
+std::uint64_t recentFrom(std::uint64_t below) {
+  return below < kLowerBits ? 0 : below - kLowerBits;
+}
+
 /// The bit of keyframe `by` in the verdicts of keyframe `checked`. Ascending with the number.
 unsigned bitOf(std::uint64_t by, std::uint64_t checked) {
   return by < checked ? kLowerBits - static_cast<unsigned>(checked - by)
@@ -43,10 +53,6 @@ void appendNumbers(unsigned bits, std::uint64_t checked, std::vector<std::uint64
 
 }  // namespace
 
-bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
-  return std::tie(x, y, z) < std::tie(o.x, o.y, o.z);
-}
-
 void GlobalCloud::Sums::add(const VoxelPoint& point) {
   ++count;
   weight += point.weight;
@@ -59,10 +65,6 @@ void GlobalCloud::Sums::add(const Sums& other) {
   weight += other.weight;
   weighted_offset += other.weighted_offset;
   weighted_sigma = std::hypot(weighted_sigma, other.weighted_sigma);
-}
-
-GlobalCloud::GlobalCloud(const GlobalCloudOptions& options) : options_(options) {
-  options_.validate();
 }
 
 void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
@@ -174,17 +176,6 @@ bool GlobalCloud::isExcluded(const Keyframe& keyframe, std::size_t voxel) const 
          violations > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
-void GlobalCloud::requireUnsettled(std::uint64_t keyframe, std::uint64_t from) const {
-  if (keyframe >= from) return;
-  throw std::invalid_argument("keyframe " + std::to_string(keyframe) +
-                              ": the keyframes around it are merged for good");
-}
-
-/// The first number of `SettledVoxel::recent`.
-std::uint64_t GlobalCloud::recentFrom(std::uint64_t below) const {
-  return below < kLowerBits ? 0 : below - kLowerBits;
-}
-
 /// Merges the sorted voxels of the settled keyframes and of those below a number, and calls
 /// visit(voxel) for each in order. The keyframes of a voxel are summed in the order of their
 /// numbers.
@@ -288,12 +279,6 @@ MapCloud::ConstPtr GlobalCloud::points(int min_keyframes) const {
     points.push_back(pointOf(voxel));
   });
   return mapCloudOf(points, options_.voxel_size_m);
-}
-
-std::size_t GlobalCloud::voxels() const {
-  std::size_t count = 0;
-  visitVoxels(std::numeric_limits<std::uint64_t>::max(), [&](const MergedVoxel&) { ++count; });
-  return count;
 }
 
 GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const {

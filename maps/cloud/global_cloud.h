@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "mapping/base/option.h"
@@ -64,7 +65,9 @@ struct GlobalCloudOptions {
 /// 64 bits. Not thread-safe.
 class GlobalCloud {
  public:
-  explicit GlobalCloud(const GlobalCloudOptions& options = {});
+  explicit GlobalCloud(const GlobalCloudOptions& options = {}) : options_(options) {
+    options_.validate();
+  }
 
   /// Keyframes whose numbers differ by more do not check each other's points.
   static constexpr int kMaxNumberDifference = 8;
@@ -105,8 +108,6 @@ class GlobalCloud {
   MapCloud::ConstPtr points() const { return points(options_.min_keyframes); }
   MapCloud::ConstPtr points(int min_keyframes) const;
 
-  /// Number of voxels that are not excluded. Costs as much as `points`.
-  std::size_t voxels() const;
   std::size_t keyframes() const { return settled_keyframes_ + keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
 
@@ -114,7 +115,9 @@ class GlobalCloud {
   struct VoxelIndex {
     std::int64_t x = 0, y = 0, z = 0;
     bool operator==(const VoxelIndex& o) const { return x == o.x && y == o.y && z == o.z; }
-    bool operator<(const VoxelIndex& o) const;
+    bool operator<(const VoxelIndex& o) const {
+      return std::tie(x, y, z) < std::tie(o.x, o.y, o.z);
+    }
   };
   struct VoxelPoint {
     VoxelIndex index;
@@ -180,8 +183,6 @@ class GlobalCloud {
   bool isExcluded(const Keyframe& keyframe, std::size_t voxel) const;
   template <typename Visit>
   void visitVoxels(std::uint64_t below, const Visit& visit) const;
-  std::uint64_t recentFrom(std::uint64_t below) const;
-  void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) const;
 
   GlobalCloudOptions options_;
   std::map<std::uint64_t, Keyframe> keyframes_;  // by number; those that are not settled

@@ -68,14 +68,6 @@ MapCloud::ConstPtr keyframeCloud(const KeyframeDepthMap& keyframe, double resolu
 
 namespace {
 
-double radiusOf(const std::vector<ViewPoint>& points) {
-  double radius_m = 0;
-  for (const ViewPoint& point : points) {
-    radius_m = std::max<double>(radius_m, point.p_ref.norm());
-  }
-  return radius_m;
-}
-
 /// The maximum distance by which a motion moves a point within a radius.
 double maxMotion(const Rigid3& from, const Rigid3& to, double radius_m) {
   return (from.translation - to.translation).norm() +
@@ -98,7 +90,10 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
   T_world_ref_.push_back(T_world_ref);
   try {
     if (movable_ > 0) {
-      const double radius_m = radiusOf(points);
+      double radius_m = 0;
+      for (const ViewPoint& point : points) {
+        radius_m = std::max<double>(radius_m, point.p_ref.norm());
+      }
       kept_.push_back({std::move(points), radius_m});
     }
     cloud_.insert(fixed_ + keyframe, in_world, T_world_ref);

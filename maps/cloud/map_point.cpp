@@ -6,36 +6,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace efm {
 namespace {
 
-/// The distance to the next larger float.
-double floatStepAt(double coordinate) {
-  const auto rounded = static_cast<float>(std::abs(coordinate));
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  return static_cast<double>(std::nextafter(rounded, kInfinity) - rounded);
-}
-
 /// See `coarseStepOf`.
-/// @param reaches the largest coordinate of each point.
-std::optional<double> coarseStepAt(std::vector<double> reaches, double resolution_m) {
-  if (reaches.empty()) return std::nullopt;
+/// @param position_of p_world of a point.
+template <typename Points, typename Position>
+std::optional<double> coarseStepAt(const Points& points, Position position_of,
+                                   double resolution_m) {
+  if (points.empty()) return std::nullopt;
+  std::vector<double> reaches;  // the largest coordinate of each point
+  reaches.reserve(points.size());
+  for (const auto& point : points) reaches.push_back(position_of(point).cwiseAbs().maxCoeff());
   const auto at = reaches.end() - 1 - static_cast<std::ptrdiff_t>(reaches.size() / 1000);
   std::nth_element(reaches.begin(), at, reaches.end());
-  const double step_m = floatStepAt(*at);
+  const auto rounded = static_cast<float>(*at);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const auto step_m = static_cast<double>(std::nextafter(rounded, kInfinity) - rounded);
   return step_m > 0.1 * resolution_m ? std::optional(step_m) : std::nullopt;
 }
 
 /// The origin of a cloud's points.
 Eigen::Vector3d originOf(const std::vector<CloudPoint>& points, double resolution_m) {
-  std::vector<double> reaches;
-  reaches.reserve(points.size());
-  for (const CloudPoint& point : points) {
-    reaches.push_back(point.p_world.cwiseAbs().maxCoeff());
-  }
-  if (!coarseStepAt(std::move(reaches), resolution_m)) return Eigen::Vector3d::Zero();
+  const auto position_of = [](const CloudPoint& point) { return point.p_world; };
+  if (!coarseStepAt(points, position_of, resolution_m)) return Eigen::Vector3d::Zero();
   // The step of floats from x to 2 x is at most x / 2^23.
   const double unit_m = std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))));
   return (medianPosition(points) / unit_m).array().round() * unit_m;
@@ -60,12 +55,8 @@ MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolutio
 }
 
 std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m) {
-  std::vector<double> reaches;
-  reaches.reserve(cloud.size());
-  for (const MapPoint& point : cloud) {
-    reaches.push_back(positionIn(cloud, point).cwiseAbs().maxCoeff());
-  }
-  return coarseStepAt(std::move(reaches), resolution_m);
+  const auto position_of = [&](const MapPoint& point) { return positionIn(cloud, point); };
+  return coarseStepAt(cloud, position_of, resolution_m);
 }
 
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud) {
