@@ -17,6 +17,11 @@ std::string sizeText(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);
 }
 
+cv::Rect windowAround(const cv::Mat& image, cv::Point pixel, int radius) {
+  const int side = 2 * radius + 1;
+  return cv::Rect(pixel.x - radius, pixel.y - radius, side, side) & cv::Rect({0, 0}, image.size());
+}
+
 }  // namespace
 
 void ComparedDepths::validate() const {
@@ -35,11 +40,9 @@ double bestTruth(const ComparedDepths& depths, cv::Point pixel,
   const double estimate_m = depths.estimate(pixel);
   double best_m = 0;
   double best_error = std::numeric_limits<double>::infinity();
-  const int tolerance = options.tolerance_px;
-  const int bottom = std::min(depths.truth.rows - 1, pixel.y + tolerance);
-  const int right = std::min(depths.truth.cols - 1, pixel.x + tolerance);
-  for (int y = std::max(0, pixel.y - tolerance); y <= bottom; ++y) {
-    for (int x = std::max(0, pixel.x - tolerance); x <= right; ++x) {
+  const cv::Rect window = windowAround(depths.truth, pixel, options.tolerance_px);
+  for (int y = window.y; y < window.br().y; ++y) {
+    for (int x = window.x; x < window.br().x; ++x) {
       if (!depths.hasTruth(y, x, options)) continue;
       const double candidate_m = depths.truth(y, x);
       const double error = std::abs(1 / estimate_m - 1 / candidate_m);
@@ -65,11 +68,6 @@ std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
     }
   }
   return pairs;
-}
-
-std::vector<DepthPair> pairDepths(const cv::Mat1f& estimate, const cv::Mat1f& truth,
-                                  const DepthPairingOptions& options) {
-  return pairDepths(ComparedDepths{estimate, truth, {}}, options);
 }
 
 namespace {
@@ -200,10 +198,9 @@ double fractionOf(std::uint64_t part, std::uint64_t whole) {
 double minError(const ComparedDepths& depths, cv::Point pixel, int tolerance) {
   const double truth_m = depths.truth(pixel);
   double min_m = std::numeric_limits<double>::infinity();
-  const int bottom = std::min(depths.estimate.rows - 1, pixel.y + tolerance);
-  const int right = std::min(depths.estimate.cols - 1, pixel.x + tolerance);
-  for (int y = std::max(0, pixel.y - tolerance); y <= bottom; ++y) {
-    for (int x = std::max(0, pixel.x - tolerance); x <= right; ++x) {
+  const cv::Rect window = windowAround(depths.estimate, pixel, tolerance);
+  for (int y = window.y; y < window.br().y; ++y) {
+    for (int x = window.x; x < window.br().x; ++x) {
       if (!depths.hasEstimate(y, x)) continue;
       min_m = std::min(min_m, std::abs(depths.estimate(y, x) - truth_m));
     }

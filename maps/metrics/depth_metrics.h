@@ -43,7 +43,7 @@ inline bool isDepth(float depth_m) { return std::isfinite(depth_m) && depth_m > 
 struct ComparedDepths {
   cv::Mat1f estimate;
   cv::Mat1f truth;
-  cv::Mat1b mask;  ///< Pixels that are evaluated: not 0. Empty: all.
+  cv::Mat1b mask = {};  ///< Pixels that are evaluated: not 0. Empty: all.
 
   bool counts(int y, int x) const { return mask.empty() || mask(y, x) != 0; }
   bool hasEstimate(int y, int x) const { return counts(y, x) && isDepth(estimate(y, x)); }
@@ -59,8 +59,6 @@ double bestTruth(const ComparedDepths& depths, cv::Point pixel, const DepthPairi
 
 /// The pairs of all pixels where both maps have a depth, row by row.
 std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
-                                  const DepthPairingOptions& options = {});
-std::vector<DepthPair> pairDepths(const cv::Mat1f& estimate, const cv::Mat1f& truth,
                                   const DepthPairingOptions& options = {});
 
 /// Errors over a set of pixels. Z is the estimate, Z_true the truth, d = ln Z - ln Z_true. All are

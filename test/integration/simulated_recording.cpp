@@ -75,7 +75,7 @@ cv::Mat1f SimulatedRecording::truthOf(const KeyframeDepthMap& keyframe) const {
 std::vector<DepthPair> SimulatedRecording::pairs(const KeyframeDepthMap& keyframe) const {
   DepthPairingOptions pairing;
   pairing.tolerance_px = 1;
-  return pairDepths(keyframe.map.depth, truthOf(keyframe), pairing);
+  return pairDepths({keyframe.map.depth, truthOf(keyframe)}, pairing);
 }
 
 double SimulatedRecording::medianDistanceToSurfaces(const MapCloud& cloud) const {

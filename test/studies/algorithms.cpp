@@ -207,7 +207,7 @@ double meanCmOfTrueCopies(const Recording& recording, const MethodResult& result
   for (const KeyframeDepthMap& keyframe : result.keyframes) {
     const cv::Mat1f truth = truthOf(recording, keyframe);
     const cv::Mat1b kept = (keyframe.map.depth > 0) & (truth > 0);
-    const auto pairs = pairDepths(only(keyframe.map.depth, kept), truth, studyPairing());
+    const auto pairs = pairDepths({only(keyframe.map.depth, kept), truth}, studyPairing());
     for (const cv::Point step : {cv::Point(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
       cv::Mat1f copied = cv::Mat1f::zeros(truth.size());
       std::size_t i = 0;  // pairs are in the order of the rows

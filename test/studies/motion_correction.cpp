@@ -96,7 +96,7 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
   const VelocityCorrection found = keyframe.motion_correction.value_or(VelocityCorrection{});
   outcome.left_cm_s += 100 * (found.linear_m_s - wrong.linear_m_s).norm();
   outcome.left_deg_s += (found.angular_rad_s - wrong.angular_rad_s).norm() / kRadiansPerDegree;
-  const auto pairs = pairDepths(keyframe.map.depth, truthOf(recording, keyframe), studyPairing());
+  const auto pairs = pairDepths({keyframe.map.depth, truthOf(recording, keyframe)}, studyPairing());
   for (const DepthPair& pair : pairs) {
     outcome.errors.push_back(std::abs(pair.estimate_m - pair.truth_m) / pair.truth_m);
   }

@@ -62,7 +62,7 @@ double medianQuarterStepCm(const Recording& recording, const MethodResult& resul
   std::vector<double> quarters;
   for (const KeyframeDepthMap& keyframe : result.keyframes) {
     for (const DepthPair& pair :
-         pairDepths(keyframe.map.depth, truthOf(recording, keyframe), studyPairing())) {
+         pairDepths({keyframe.map.depth, truthOf(recording, keyframe)}, studyPairing())) {
       quarters.push_back(100 * 0.25 * step * pair.truth_m * pair.truth_m);
     }
   }

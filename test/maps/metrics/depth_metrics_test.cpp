@@ -13,7 +13,7 @@ TEST(PairDepths, PixelsWithoutAnEstimateOrATruthAreLeftOut) {
   const cv::Mat1f estimate = (cv::Mat1f(1, 5) << 1, 0, 2, nan, 3);
   const cv::Mat1f truth = (cv::Mat1f(1, 5) << 1, 1, 0, 1, INFINITY);
 
-  const std::vector<DepthPair> pairs = pairDepths(estimate, truth);
+  const std::vector<DepthPair> pairs = pairDepths({estimate, truth});
 
   ASSERT_EQ(pairs.size(), 1U);
   EXPECT_EQ(pairs[0].estimate_m, 1);
@@ -24,11 +24,11 @@ TEST(PairDepths, TruthFartherThanTheLimitCountsAsNone) {
   const cv::Mat1f estimate = (cv::Mat1f(1, 3) << 2, 2, 2);
   const cv::Mat1f truth = (cv::Mat1f(1, 3) << 5, 6, 4);
 
-  EXPECT_EQ(pairDepths(estimate, truth, {0, 5.0}).size(), 2U);
+  EXPECT_EQ(pairDepths({estimate, truth}, {0, 5.0}).size(), 2U);
   for (const DepthPairingOptions& wrong : {DepthPairingOptions{-1, 5}, {101, 5}, {0, 0}}) {
-    EXPECT_THROW(pairDepths(estimate, truth, wrong), std::invalid_argument);
+    EXPECT_THROW(pairDepths({estimate, truth}, wrong), std::invalid_argument);
   }
-  EXPECT_NO_THROW(pairDepths(estimate, truth, {100, 1e-9}));
+  EXPECT_NO_THROW(pairDepths({estimate, truth}, {100, 1e-9}));
 }
 
 TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
@@ -37,12 +37,12 @@ TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
   const cv::Mat1f estimate = (cv::Mat1f(2, 3) << 0, 0, 0, 2, 0, 0);
   const cv::Mat1f truth = (cv::Mat1f(2, 3) << 1, 0, 3, 9, 4, 0);
 
-  EXPECT_EQ(pairDepths(estimate, truth, {0})[0].truth_m, 9);
-  EXPECT_EQ(pairDepths(estimate, truth, {1})[0].truth_m, 4);
+  EXPECT_EQ(pairDepths({estimate, truth}, {0})[0].truth_m, 9);
+  EXPECT_EQ(pairDepths({estimate, truth}, {1})[0].truth_m, 4);
 }
 
 TEST(PairDepths, MapsOfDifferentSizeAreRefused) {
-  EXPECT_THROW(pairDepths(cv::Mat1f::ones(2, 3), cv::Mat1f::ones(3, 2)), std::invalid_argument);
+  EXPECT_THROW(pairDepths({cv::Mat1f::ones(2, 3), cv::Mat1f::ones(3, 2)}), std::invalid_argument);
 }
 
 TEST(PairDepths, AMaskLeavesOutEstimatesAndTruths) {

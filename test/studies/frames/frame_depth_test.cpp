@@ -74,7 +74,7 @@ TEST(FrameDepth, LiesOnTheSurfaces) {
   pairing.tolerance_px = 1;  // silhouettes are as wide as the lens' blur
   std::vector<double> errors;
   for (const DepthPair& pair :
-       pairDepths(depth.depth, renderDepth(scene, somewhere(), sequence.view), pairing)) {
+       pairDepths({depth.depth, renderDepth(scene, somewhere(), sequence.view)}, pairing)) {
     errors.push_back(std::abs(pair.estimate_m / pair.truth_m - 1));
   }
   ASSERT_GT(errors.size(), 500U);

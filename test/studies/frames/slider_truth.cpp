@@ -28,7 +28,7 @@ std::vector<double> relativeErrors(const cv::Mat1f& depth_m, const cv::Mat1f& tr
   DepthPairingOptions pairing;
   pairing.tolerance_px = 1;
   std::vector<double> errors;
-  for (const DepthPair& pair : pairDepths(depth_m, truth_m, pairing)) {
+  for (const DepthPair& pair : pairDepths({depth_m, truth_m}, pairing)) {
     errors.push_back(std::abs(pair.estimate_m / pair.truth_m - 1));
   }
   return errors;

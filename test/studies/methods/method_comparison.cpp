@@ -141,7 +141,7 @@ DepthPairingOptions studyPairing() {
 
 void appendPairs(const cv::Mat1f& depth_m, const cv::Mat1f& truth_m, std::vector<DepthPair>& pairs,
                  const DepthPairingOptions& pairing) {
-  const std::vector<DepthPair> some = pairDepths(depth_m, truth_m, pairing);
+  const std::vector<DepthPair> some = pairDepths({depth_m, truth_m}, pairing);
   pairs.insert(pairs.end(), some.begin(), some.end());
 }
 
