@@ -36,19 +36,6 @@ void WindowGraph::addTracker(const TrackerErrors& errors) {
   }
 }
 
-const Rigid3& WindowGraph::T_world_ref(std::size_t keyframe) const {
-  return graph_.T_world_node[node_[keyframe].value()];
-}
-
-const Rigid3& WindowGraph::T_world_ref_denoised(std::size_t keyframe) const {
-  return graph_.T_world_node[node_[keyframe].value() + 1];
-}
-
-std::optional<Matrix6d> WindowGraph::denoisedCovariance(const PoseGraphOptions& options,
-                                                        std::size_t keyframe) const {
-  return poseCovariance(options, graph_, node_[keyframe].value() + 1);
-}
-
 /// The node of T_world_ref; creates both nodes of the keyframe where they are missing.
 std::size_t WindowGraph::refNode(std::size_t keyframe) {
   std::optional<std::size_t>& node = node_[keyframe];
@@ -173,12 +160,9 @@ constexpr std::size_t kMaxLoopsPerAnchor = 2;
 /// Takes small motions d in frame `a` to frame `b`: T_b_a * motion(d) = motion(M d) * T_b_a.
 Matrix6d motionToFrame(const Rigid3& T_b_a) {
   const Eigen::Matrix3d R_b_a = T_b_a.rotation.toRotationMatrix();
-  const Eigen::Vector3d& t = T_b_a.translation;
-  Eigen::Matrix3d cross;
-  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
   Matrix6d motion = Matrix6d::Zero();
   motion.topLeftCorner<3, 3>() = R_b_a;
-  motion.topRightCorner<3, 3>() = cross * R_b_a;
+  motion.topRightCorner<3, 3>() = crossMatrix(T_b_a.translation) * R_b_a;
   motion.bottomRightCorner<3, 3>() = R_b_a;
   return motion;
 }

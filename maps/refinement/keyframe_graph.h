@@ -30,11 +30,17 @@ class WindowGraph {
 
   bool has(std::size_t keyframe) const { return node_[keyframe].has_value(); }
   /// The poses of a keyframe in the graph.
-  const Rigid3& T_world_ref(std::size_t keyframe) const;
-  const Rigid3& T_world_ref_denoised(std::size_t keyframe) const;
+  const Rigid3& T_world_ref(std::size_t keyframe) const {
+    return graph_.T_world_node[node_[keyframe].value()];
+  }
+  const Rigid3& T_world_ref_denoised(std::size_t keyframe) const {
+    return graph_.T_world_node[node_[keyframe].value() + 1];
+  }
   /// `poseCovariance` of T_world_ref_denoised.
   std::optional<Matrix6d> denoisedCovariance(const PoseGraphOptions& options,
-                                             std::size_t keyframe) const;
+                                             std::size_t keyframe) const {
+    return poseCovariance(options, graph_, node_[keyframe].value() + 1);
+  }
 
  private:
   std::size_t refNode(std::size_t keyframe);

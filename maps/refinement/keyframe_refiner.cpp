@@ -54,7 +54,7 @@ void LoopCloser::search(KeyframeGraph& graph) {
 bool LoopCloser::check(KeyframeGraph& graph, const LoopCandidate& candidate) {
   const RefinedKeyframe& older = graph.keyframes[candidate.older];
   const RefinedKeyframe& newer = graph.keyframes[candidate.newer];
-  ++counts_.checked;
+  ++counts_.loop_checks;
   const TrackerErrors errors = graph.tracker.cautious();
   const Matrix6d covariance =
       errors.noiseCovariance(older.noise_scale) + errors.noiseCovariance(newer.noise_scale) +
@@ -69,7 +69,7 @@ bool LoopCloser::check(KeyframeGraph& graph, const LoopCandidate& candidate) {
   }
   if (!factor) return false;
   graph.factors.push_back(*factor);
-  ++counts_.verified;
+  ++counts_.loops;
   const std::size_t oldest = std::min(candidate.older, candidate.newer);
   oldest_unsolved_ = std::min(oldest_unsolved_.value_or(oldest), oldest);
   return true;
@@ -116,7 +116,7 @@ WindowGraph LoopCloser::solve(KeyframeGraph& graph, std::size_t first_free) {
     factor->sqrt_information.setZero();  // it keeps its index and has no weight
     factor->offset.setZero();
   }
-  counts_.dropped += wrong.size();
+  counts_.loops_dropped += wrong.size();
   return graph.solveFrom(first_free, options_.graph);
 }
 
@@ -280,13 +280,11 @@ Rigid3 KeyframeRefiner::T_world_odom() const {
   return newest.T_world_ref_denoised * newest.T_odom_ref.inverse();
 }
 
-Rigid3 KeyframeRefiner::T_world_ref_denoised() const {
-  return graph_.keyframes.empty() ? Rigid3{} : graph_.keyframes.back().T_world_ref_denoised;
-}
-
 RefinementCounts KeyframeRefiner::counts() const {
-  const LoopCounts& loops = loops_.counts();
-  return {registered_, loops.checked, loops.verified, loops.dropped, graph_.failed_solves};
+  RefinementCounts counts = loops_.counts();
+  counts.registered = registered_;
+  counts.failed_solves = graph_.failed_solves;
+  return counts;
 }
 
 }  // namespace efm

@@ -46,10 +46,12 @@ struct RefinementOptions {
   void validate() const { requireFields(*this); }
 };
 
-struct LoopCounts {
-  std::uint64_t checked = 0;   ///< Candidates that were registered.
-  std::uint64_t verified = 0;  ///< Candidates that became factors.
-  std::uint64_t dropped = 0;   ///< Of these, the ones that other factors contradicted.
+struct RefinementCounts {
+  std::uint64_t registered = 0;     ///< Keyframes that were registered with earlier ones.
+  std::uint64_t loop_checks = 0;    ///< Candidates that were registered.
+  std::uint64_t loops = 0;          ///< Candidates that became factors.
+  std::uint64_t loops_dropped = 0;  ///< Loops that other factors contradicted.
+  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed: poses stayed.
 };
 
 /// Finds loops, verifies them, and solves the keyframes since the oldest new loop.
@@ -69,23 +71,16 @@ class LoopCloser {
   /// @param graph at least two keyframes.
   WindowGraph solveAll(KeyframeGraph& graph);
 
-  const LoopCounts& counts() const { return counts_; }
+  /// The counts of loops; the others are 0.
+  const RefinementCounts& counts() const { return counts_; }
 
  private:
   WindowGraph solve(KeyframeGraph& graph, std::size_t first_free);
 
   RefinementOptions options_;
-  LoopCounts counts_;
+  RefinementCounts counts_;
   std::optional<std::size_t> oldest_unsolved_;  // the oldest keyframe of the new loops
   std::size_t solved_at_ = 0;                   // the newest keyframe of that time
-};
-
-struct RefinementCounts {
-  std::uint64_t registered = 0;   ///< Keyframes that were registered with earlier ones.
-  std::uint64_t loop_checks = 0;  ///< As in LoopCounts.
-  std::uint64_t loops = 0;
-  std::uint64_t loops_dropped = 0;
-  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed: poses stayed.
 };
 
 /// Refines the poses of keyframes by their points, one keyframe after the other:
@@ -134,7 +129,9 @@ class KeyframeRefiner {
   /// Brings current poses of the tracker to the refined world; the identity without keyframes.
   Rigid3 T_world_odom() const;
   /// The pose of the newest keyframe by the tracker, without noise; the identity without keyframes.
-  Rigid3 T_world_ref_denoised() const;
+  Rigid3 T_world_ref_denoised() const {
+    return graph_.keyframes.empty() ? Rigid3{} : graph_.keyframes.back().T_world_ref_denoised;
+  }
   /// The covariance of a corrected pose of the tracker at the newest keyframe, as in
   /// `poseCovariance`, relative to the oldest fixed keyframes of the last window. With fewer than
   /// two keyframes that of the noise.

@@ -94,12 +94,6 @@ struct NormalEquations {
   Vector6d gradient = Vector6d::Zero();
 };
 
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 /// The factor with the error |A d + b|^2, where A^T A is the information and A^T b the gradient.
 /// Directions that the pairs leave open have rows of zeros.
 RelativePoseFactor factorOf(const NormalEquations& equations, const Rigid3& T_from_to) {
@@ -148,8 +142,7 @@ void summarize(const Neighbours& found, const std::vector<MapKeyframe>& map, std
   }
   registration.visible = found.visible;
   registration.inliers = found.inliers;
-  if (errors.empty()) return;
-  registration.median_error = upperMedian(errors);
+  if (!errors.empty()) registration.median_error = upperMedian(errors);
 }
 
 }  // namespace
@@ -159,10 +152,6 @@ void KeyframeRegistrationOptions::validate() const {
   requireOption(first_distance_px >= last_distance_px && first_distance_px <= 1e4,
                 "first_distance_px", first_distance_px, "from last_distance_px to 10000 (pixels)",
                 {"last_distance_px"});
-}
-
-double Registration::inlierRatio() const {
-  return visible > 0 ? static_cast<double>(inliers) / static_cast<double>(visible) : 0;
 }
 
 Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,

@@ -53,7 +53,9 @@ struct Registration {
   std::uint64_t failed_solves = 0;  ///< Minima that could not be computed.
 
   /// Fraction of the visible points that are inliers.
-  double inlierRatio() const;
+  double inlierRatio() const {
+    return visible > 0 ? static_cast<double>(inliers) / static_cast<double>(visible) : 0;
+  }
 };
 
 /// Registers a keyframe with the local map by generalised ICP (Segal, Haehnel and Thrun, RSS 2009).

@@ -65,6 +65,12 @@ bool isPositiveDefinite(const Eigen::Matrix3d& matrix) {
 
 Matrix6d inverseOf(const Matrix6d& matrix) { return matrix.inverse(); }
 
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
 EigenDecomposition eigenDecomposition(const Matrix6d& matrix) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
   return {solver.eigenvalues(), solver.eigenvectors()};
@@ -189,20 +195,6 @@ using FactorCost = ceres::AutoDiffCostFunction<FactorError, 6, kPoseSize, kPoseS
 using PoseManifold =
     ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
 
-PoseManifold poseManifold() {
-  return PoseManifold(ceres::EigenQuaternionManifold(), ceres::EuclideanManifold<3>());
-}
-
-/// Takes small motions on the manifold to ours. The manifold has half a rotation vector about the
-/// axes of the world, then a translation along them. Ours are the translation, then the whole
-/// rotation vector.
-Matrix6d ownMotionFromManifold() {
-  Matrix6d own = Matrix6d::Zero();
-  own.topRightCorner<3, 3>().setIdentity();
-  own.bottomLeftCorner<3, 3>() = 2 * Eigen::Matrix3d::Identity();
-  return own;
-}
-
 ceres::Problem::Options borrowing() {
   ceres::Problem::Options options;
   options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -225,7 +217,7 @@ ceres::Solver::Options solverOptions(int max_iterations, ceres::LinearSolverType
 class GraphProblem {
  public:
   GraphProblem(const PoseGraph& graph, double robust_sigmas)
-      : manifold_(poseManifold()), loss_(robust_sigmas), problem_(borrowing()) {
+      : loss_(robust_sigmas), problem_(borrowing()) {
     for (const Rigid3& pose : graph.T_world_node) blocks_.push_back(blockOf(pose));
     for (const RelativePoseFactor& factor : graph.factors) {
       if (graph.fixed[factor.from] && graph.fixed[factor.to]) continue;
@@ -265,7 +257,7 @@ std::optional<Rigid3> alignToMap(const std::vector<PointPair>& pairs, const Pose
     return std::nullopt;
   }
   PoseBlock pose = blockOf(T_map_start);
-  PoseManifold manifold = poseManifold();
+  PoseManifold manifold;
   ceres::CauchyLoss loss(options.robust_sigmas);
   ceres::Problem problem(borrowing());
   problem.AddParameterBlock(pose.data(), kPoseSize, &manifold);
@@ -331,7 +323,12 @@ std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const Po
   if (!covariance.Compute(blocks, &problem.problem())) return std::nullopt;
   Eigen::Matrix<double, 6, 6, Eigen::RowMajor> of_manifold;
   covariance.GetCovarianceBlockInTangentSpace(block, block, of_manifold.data());
-  const Matrix6d own = ownMotionFromManifold();
+  // Takes small motions on the manifold to ours. The manifold has half a rotation vector about the
+  // axes of the world, then a translation along them. Ours are the translation, then the whole
+  // rotation vector.
+  Matrix6d own = Matrix6d::Zero();
+  own.topRightCorner<3, 3>().setIdentity();
+  own.bottomLeftCorner<3, 3>() = 2 * Eigen::Matrix3d::Identity();
   return own * of_manifold * own.transpose();
 }
 

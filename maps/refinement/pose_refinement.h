@@ -32,6 +32,9 @@ bool isPositiveDefinite(const Eigen::Matrix3d& matrix);
 /// @param matrix not singular.
 Matrix6d inverseOf(const Matrix6d& matrix);
 
+/// [v]x: crossMatrix(v) * w = v x w.
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
+
 /// matrix = vectors * diag(values) * vectors^T; values ascending.
 struct EigenDecomposition {
   Vector6d values;

@@ -159,47 +159,29 @@ void RegistrationCloudOptions::validate() const {
                 max_map_points, "from max_points to 1000000", {"max_points"});
 }
 
-RegistrationPoints selectPoints(const KeyframeDepthMap& keyframe,
-                                const RegistrationCloudOptions& options) {
-  options.validate();
-  std::vector<CertainPixel> pixels =
-      spreadOver(certainPixels(keyframe.map), keyframe.map.depth.size(), options.max_map_points);
-  RegistrationPoints selected;
-  if (pixels.empty()) return selected;
-  selected.points.reserve(pixels.size());
-  selected.min_inverse_depth = std::numeric_limits<double>::infinity();
-  for (const CertainPixel& pixel : pixels) {
-    const RegistrationPoint point = pointOf(keyframe, pixel, options);
-    if (!isUsable(point)) continue;
-    selected.points.push_back(point);
-    selected.max_inverse_depth = std::max<double>(selected.max_inverse_depth, pixel.inverse_depth);
-    selected.min_inverse_depth = std::min<double>(selected.min_inverse_depth, pixel.inverse_depth);
-  }
-  if (selected.points.empty()) selected.min_inverse_depth = 0;
-  selected.median_inverse_depth_sigma =
-      upperMedian(pixels, [](const CertainPixel& a, const CertainPixel& b) {
-        return a.sigma < b.sigma;
-      }).sigma;
-  return selected;
-}
-
-namespace {
-
-/// Margin of the range of depths in view, because a wall that faces the view has one depth.
-constexpr double kDepthMarginSigmas = 3;
-
-}  // namespace
-
 RegistrationCloud::RegistrationCloud(const KeyframeDepthMap& keyframe,
                                      const RegistrationCloudOptions& options)
     : view_(keyframe.view) {
-  RegistrationPoints selected = selectPoints(keyframe, options);
-  points_ = std::move(selected.points);
+  options.validate();
+  std::vector<CertainPixel> pixels =
+      spreadOver(certainPixels(keyframe.map), keyframe.map.depth.size(), options.max_map_points);
+  points_.reserve(pixels.size());
+  min_inverse_depth_ = std::numeric_limits<double>::infinity();
+  for (const CertainPixel& pixel : pixels) {
+    const RegistrationPoint point = pointOf(keyframe, pixel, options);
+    if (!isUsable(point)) continue;
+    points_.push_back(point);
+    max_inverse_depth_ = std::max<double>(max_inverse_depth_, pixel.inverse_depth);
+    min_inverse_depth_ = std::min<double>(min_inverse_depth_, pixel.inverse_depth);
+  }
+  if (points_.empty()) min_inverse_depth_ = 0;
   num_query_points_ = std::min(points_.size(), static_cast<std::size_t>(options.max_points));
   constexpr float kMinSigma = 1e-9F;  // 1/m: a variance may be 0
-  px_per_inverse_depth_ = 1 / std::max(selected.median_inverse_depth_sigma, kMinSigma);
-  max_inverse_depth_ = selected.max_inverse_depth;
-  min_inverse_depth_ = selected.min_inverse_depth;
+  const auto more_certain = [](const CertainPixel& a, const CertainPixel& b) {
+    return a.sigma < b.sigma;
+  };
+  const float sigma = pixels.empty() ? 0 : upperMedian(pixels, more_certain).sigma;
+  px_per_inverse_depth_ = 1 / std::max(sigma, kMinSigma);
 }
 
 Eigen::Vector3f RegistrationCloud::viewCoordinates(const Eigen::Vector3d& p_ref) const {
@@ -209,7 +191,9 @@ Eigen::Vector3f RegistrationCloud::viewCoordinates(const Eigen::Vector3d& p_ref)
 
 bool RegistrationCloud::isInView(const Eigen::Vector3d& p_ref) const {
   if (points_.empty() || !(p_ref.z() > 0)) return false;
-  const double margin = kDepthMarginSigmas / px_per_inverse_depth_;
+  // Margin of the range of depths in view, because a wall that faces the view has one depth.
+  constexpr double kMarginSigmas = 3;
+  const double margin = kMarginSigmas / px_per_inverse_depth_;
   const double inverse_depth = 1 / p_ref.z();
   if (inverse_depth > max_inverse_depth_ + margin || inverse_depth < min_inverse_depth_ - margin) {
     return false;
@@ -248,7 +232,5 @@ void RegistrationCloud::clear() noexcept {
   min_inverse_depth_ = 0;
   tree_.reset();
 }
-
-void RegistrationCloud::releaseTree() const { tree_.reset(); }
 
 }  // namespace efm

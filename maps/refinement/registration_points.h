@@ -53,25 +53,14 @@ struct RegistrationPoint {
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Identity();  ///< m^2, frame `ref`.
 };
 
-/// The points of a keyframe for registrations, the most certain ones first.
-struct RegistrationPoints {
-  std::vector<RegistrationPoint> points;
-  double max_inverse_depth = 0;          ///< 1/m.
-  double min_inverse_depth = 0;          ///< 1/m.
-  float median_inverse_depth_sigma = 0;  ///< 1/m. 0 without points.
-};
-
-/// Selects the most certain points of each cell of the image, and computes their covariances.
-RegistrationPoints selectPoints(const KeyframeDepthMap& keyframe,
-                                const RegistrationCloudOptions& options);
-
 /// The points of a keyframe for registrations. 48 bytes a point, and as much for the search tree.
 class RegistrationCloud {
  public:
+  /// Selects the most certain points of each cell of the image, and computes their covariances.
   RegistrationCloud(const KeyframeDepthMap& keyframe, const RegistrationCloudOptions& options);
 
-  /// Other keyframes are registered with all points. The first `numQueryPoints` are registered with
-  /// other keyframes.
+  /// The most certain ones first. Other keyframes are registered with all points. The first
+  /// `numQueryPoints` are registered with other keyframes.
   const std::vector<RegistrationPoint>& points() const { return points_; }
   std::size_t numQueryPoints() const { return num_query_points_; }
   /// The focal length in pixels, and the middle of the range of inverse depths, 1/m.
@@ -89,7 +78,7 @@ class RegistrationCloud {
   /// Drops all points: nothing is in view, and nothing is found.
   void clear() noexcept;
   /// Frees the search tree. The next search builds it again. Neither is thread-safe.
-  void releaseTree() const;
+  void releaseTree() const { tree_.reset(); }
 
  private:
   Eigen::Vector3f viewCoordinates(const Eigen::Vector3d& p_ref) const;

@@ -154,10 +154,6 @@ void TrackerModel::addSample(const RelativePoseFactor& factor, const RefinedKeyf
   if (samples_.size() > kMaxSamples) samples_.pop_front();
 }
 
-void TrackerModel::update() {
-  if (adapt_) errors_ = estimateTrackerErrors({samples_.begin(), samples_.end()}, expected_);
-}
-
 bool TrackerModel::increaseDrift() {
   if (drift_factor_ >= kMaxDriftFactor) return false;
   drift_factor_ *= kDriftStep;

@@ -96,7 +96,9 @@ class TrackerModel {
   void addSample(const RelativePoseFactor& factor, const RefinedKeyframe& from,
                  const RefinedKeyframe& to);
   /// Estimates the errors from the last samples.
-  void update();
+  void update() {
+    if (adapt_) errors_ = estimateTrackerErrors({samples_.begin(), samples_.end()}, expected_);
+  }
   /// Multiplies the drift in pose graphs, up to a limit.
   /// @return whether it was below the limit.
   bool increaseDrift();
