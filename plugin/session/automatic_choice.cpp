@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The members of MappingSession that choose automatic options.
+// Members of MappingSession that choose automatic options.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,14 +11,13 @@
 namespace efm {
 namespace {
 
-/// The shortest window to choose from, if a jump of the tracker or a clock reset cuts the first
-/// window.
+/// Shortest window to choose from, if a tracker jump or a clock reset cuts the first window.
 constexpr double kMinFirstWindowS = 0.2;
-/// Without a scene, the choice waits so long, and for at most `max_queue_events` events.
+/// Longest wait for a scene. It also ends after `max_queue_events` events.
 constexpr std::int64_t kMaxSceneWaitNs = 10 * kNanosecondsPerSecond;
-/// After so many keyframes in a row that do not agree with their limits the scene is looked for
-/// again; once in such an interval, which doubles up to the longest while the scene that is found
-/// does not help.
+/// Number of consecutive keyframes that do not agree with their depth limits before the options are
+/// chosen again. This happens at most once in an interval, which doubles up to the longest one as
+/// long as the new choice does not help.
 constexpr int kMaxMisfits = 3;
 constexpr std::int64_t kLookIntervalNs = 2 * kNanosecondsPerSecond;
 constexpr std::int64_t kMaxLookIntervalNs = 8 * kNanosecondsPerSecond;
@@ -29,7 +28,7 @@ double lengthOf(const WindowData& data) {
   return secondsBetween(data.window.t0_ns, data.window.t1_ns);
 }
 
-/// Adds to each reason what the option was chosen from.
+/// Adds the source of the choice to each reason.
 void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
   for (ChosenOption& option : chosen) {
     option.reason +=
@@ -39,20 +38,20 @@ void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
 
 }  // namespace
 
-/// Chooses automatic options as soon as a window shows the scene, or after 10 s without a scene. A
-/// second choice keeps the options of the first one if it sees no scene.
+/// Chooses automatic options from the first window that shows the scene, or after 10 s without a
+/// scene. A second choice keeps the options of the first choice if it sees no scene.
 /// @return true if all automatic options are chosen.
 bool MappingSession::chooseAutomatic() {
   if (first_look_) return chooseFromFirstLook();
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
     const std::optional<WindowData> data = dataToChooseFrom();
-    // No window yet: at the end of a piece of the input, try the next piece; otherwise wait for
-    // more data; at the end of the input, choose without data.
+    // No window yet. At the end of the input, choose without data. At the end of a piece of the
+    // input, try the next piece. Otherwise wait for more data.
     if (!data && is_first && pieceEnds() && !hasWaitedTooLong() && endPiece()) continue;
     if (!data && !finished_ && !pieceEnds()) return false;
     std::vector<WindowSample> samples;
-    std::optional<double> duration_s;  // where all of it is known
+    std::optional<double> duration_s;  // set if all data are known
     if (data) samples.push_back(sampleOf(*data));
     if (data && finished_ && lengthOf(*data) < kFirstWindowS) duration_s = lengthOf(*data);
     FusionMapperOptions chosen = options_.mapper;
@@ -76,8 +75,8 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
   return true;
 }
 
-/// Uses what was chosen from a look at live data: without a scene wide limits of depth, or the
-/// options of the first choice.
+/// Uses a choice from live data. Without a scene, uses wide depth limits or the options of the
+/// first choice.
 void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice choice,
                              FusionMapperOptions chosen) {
   if (!choice.found_scene && status_.choices > 0) {
@@ -97,7 +96,7 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
   use(std::move(choice), chosen);
 }
 
-/// In playback: as soon as the recording has ended, or there is too much of it.
+/// Chooses in playback, after the end of the recording or if too many events are held.
 bool MappingSession::chooseFromFirstLook() {
   const double held_mb = static_cast<double>(mapper_.heldEvents() * sizeof(Event)) / 1e6;
   if (!finished_ && !first_look_ends_ && held_mb <= options_.live.max_queue_mb) return false;
@@ -105,7 +104,7 @@ bool MappingSession::chooseFromFirstLook() {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
                                       finished_ ? survey.duration_s : std::nullopt, chosen);
-  if (finished_) {  // all of it was seen: limits that follow would be no better
+  if (finished_) {  // no more data: following limits would be no better
     use(std::move(choice), chosen);
     depth_follower_.reset();
     return true;
@@ -121,8 +120,7 @@ bool MappingSession::chooseFromFirstLook() {
   return true;
 }
 
-/// A window to choose from. At a jump of the tracker or a clock reset, what it leaves of the
-/// window.
+/// Returns a window to choose from. A tracker jump or a clock reset may cut the window.
 std::optional<WindowData> MappingSession::dataToChooseFrom() {
   std::optional<WindowData> data = mapper_.window();
   if (data || !pieceEnds()) return data;
@@ -130,16 +128,16 @@ std::optional<WindowData> MappingSession::dataToChooseFrom() {
   return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
 }
 
-/// Whether the tracker has jumped so often for 10 s that there was no window to choose from. The
-/// first call begins the wait.
+/// Returns whether tracker jumps left no window to choose from for 10 s. The first call begins the
+/// wait.
 bool MappingSession::hasWaitedTooLong() {
   if (!status_.events) return false;
   if (!no_scene_since_ns_) no_scene_since_ns_ = status_.events->last_ns;
   return status_.events->last_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs;
 }
 
-/// Drops a window that shows no scene, or goes on to the next piece of the input if this one ends
-/// with it. @return false if the wait for a scene has lasted too long, or nothing comes after it.
+/// Drops a window that shows no scene. If this piece of the input ends with it, goes on to the next
+/// piece. @return false if the wait for a scene was too long, or no piece follows.
 bool MappingSession::skipWithoutScene(const WindowData& data) {
   const Window& window = data.window;
   if (!no_scene_since_ns_) no_scene_since_ns_ = window.t0_ns;
@@ -153,7 +151,7 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
   return true;
 }
 
-/// Goes on with the window of the options, where it was shortened. @return whether it was.
+/// Uses the window of the options if it was shortened. @return true if it was.
 bool MappingSession::applyShorterWindow(double former_s) {
   if (options_.mapper.policy.window_s == former_s) return false;
   mapper_.configure(options_.mapper.policy, planes());
@@ -161,8 +159,8 @@ bool MappingSession::applyShorterWindow(double former_s) {
   return true;
 }
 
-/// Where the windows that were chosen are larger than the queue: chooses shorter ones.
-/// @return whether it did.
+/// Shortens chosen windows that are larger than the queue.
+/// @return true if it shortened them.
 bool MappingSession::shortenWindows(double events_per_s) {
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
@@ -170,8 +168,8 @@ bool MappingSession::shortenWindows(double events_per_s) {
   return applyShorterWindow(former_s);
 }
 
-/// Where two segments in a row between jumps of the tracker were too short for a window that was
-/// chosen: chooses a shorter one.
+/// Shortens a chosen window if two consecutive segments between tracker jumps were too short for
+/// it.
 void MappingSession::fitIntoSegments(std::int64_t end_ns) {
   const double length_s = secondsBetween(segment_.begin_ns, end_ns);
   const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
@@ -184,7 +182,7 @@ void MappingSession::fitIntoSegments(std::int64_t end_ns) {
   applyShorterWindow(former_s);
 }
 
-/// Goes on with the options of a choice.
+/// Uses the options of a choice from now on.
 void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen) {
   options_.mapper = chosen;
   options_.automatic = {};
@@ -199,8 +197,8 @@ void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen)
   look_interval_ns_ = std::clamp(2 * look_interval_ns_, kLookIntervalNs, kMaxLookIntervalNs);
 }
 
-/// Where keyframes do not agree with their limits, chooses the options once more from the data
-/// after this window.
+/// Chooses the options again, from the data after this window, if keyframes do not agree with their
+/// depth limits.
 void MappingSession::lookAgain(const Window& window) {
   if (depth_follower_->misfits() == 0) look_interval_ns_ = kLookIntervalNs;
   if (depth_follower_->misfits() < kMaxMisfits || window.t1_ns < look_again_ns_) return;

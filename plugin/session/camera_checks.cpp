@@ -19,18 +19,17 @@ namespace {
 using Cameras = RecordingStatistics::Cameras;
 using Warnings = std::vector<Warning>;
 
-constexpr std::uint64_t kEnoughEvents = 1000;  // fewer say nothing
+constexpr std::uint64_t kEnoughEvents = 1000;  // fewer events are no evidence
 
 void checkBaselines(const Cameras& cameras, Warnings& warnings) {
-  // From a stereo microscope to a train; metres that are really millimetres, and the other way
-  // round, are a factor of 1000 off.
+  // From a stereo microscope to a train. A confusion of metres and millimetres is a factor of 1000.
   constexpr double kMinBaselineM = 0.005;
   constexpr double kMaxBaselineM = 20;
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
       const double baseline_m = baselineOf(a->second.camera, b->second.camera);
       if (baseline_m >= kMinBaselineM && baseline_m <= kMaxBaselineM) continue;
-      if (!isCalibrated(a->second.camera.model)) continue;  // nothing is known of its pose either
+      if (!isCalibrated(a->second.camera.model)) continue;  // its pose is unknown, too
       addWarning(warnings, "baseline",
                  "cameras {} and {} are {:g} m apart: expected {:g} to {:g} m; "
                  "are the translations of the calibration in metres? "
@@ -41,7 +40,7 @@ void checkBaselines(const Cameras& cameras, Warnings& warnings) {
 }
 
 void checkFieldOfView(int camera, const CameraModel& model, Warnings& warnings) {
-  // A telescope, and the limit of a pinhole image. A fisheye lens sees up to 220 degrees.
+  // Limits: a telescope, and a pinhole image. A fisheye lens sees up to 220 degrees.
   constexpr double kMinDeg = 5;
   const double max_deg = model.distortion == DistortionModel::kEquidistant ? 220 : 170;
   const double view_deg = fieldOfView(model).x() / kRadiansPerDegree;
@@ -54,7 +53,7 @@ void checkFieldOfView(int camera, const CameraModel& model, Warnings& warnings) 
 }
 
 void checkPrincipalPoint(int camera, const CameraModel& model, Warnings& warnings) {
-  // Lenses are mounted within a few per cent of the centre; a cut-out of a sensor reaches further.
+  // Lenses are mounted within a few per cent of the centre. A cropped sensor has a larger offset.
   const auto in_middle = [](double center, int size) {
     return center >= 0.25 * size && center <= 0.75 * size;
   };
@@ -66,9 +65,9 @@ void checkPrincipalPoint(int camera, const CameraModel& model, Warnings& warning
              camera, model.cx, model.cy, model.width, model.height);
 }
 
-/// The fraction of a grid's pixels without a viewing ray.
+/// Returns the fraction of a grid's pixels without a viewing ray.
 double fractionWithoutRay(const CameraModel& model) {
-  constexpr int kGrid = 64;  // enough for a fraction of 5 %, and quick
+  constexpr int kGrid = 64;  // fast, and fine enough for a fraction of 5 %
   const LensInverse lens(model);
   int without = 0;
   for (int row = 0; row < kGrid; ++row) {
@@ -118,7 +117,7 @@ void checkActivity(const Cameras& cameras, Warnings& warnings) {
   }
 }
 
-/// The fraction of a camera's events that its busiest 1 % of pixels have.
+/// Returns the fraction of a camera's events that come from its busiest 1 % of pixels.
 double fractionOfBusiest(const CameraStatistics& camera) {
   std::vector<std::uint32_t> pixels = camera.pixels;
   const auto busiest = static_cast<std::ptrdiff_t>(pixels.size() / 100);
@@ -128,10 +127,10 @@ double fractionOfBusiest(const CameraStatistics& camera) {
 }
 
 void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
-  // Edges sweep over most of the image. One hot pixel among the others' events is for the filter.
+  // Edges sweep over most of the image. A single hot pixel is left to the filter.
   constexpr double kMaxFraction = 0.9;
   for (const auto& [key, camera] : cameras) {
-    // With fewer events, 1 % of the pixels may have them all by chance.
+    // With fewer events, 1 % of the pixels may have all events by chance.
     if (camera.pixels.empty() || camera.events.count < camera.pixels.size() / 10) continue;
     const double fraction = fractionOfBusiest(camera);
     if (fraction <= kMaxFraction) continue;
@@ -143,8 +142,8 @@ void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
   }
 }
 
-/// The events of the columns, or of the rows, of a camera.
-/// @param most that count of each pixel.
+/// Returns the number of events of each column, or of each row.
+/// @param most counted events of a pixel.
 std::vector<double> eventsByLine(const CameraStatistics& camera, std::uint32_t most, bool columns) {
   const auto width = static_cast<std::size_t>(camera.camera.model.width);
   std::vector<double> lines(columns ? width : camera.pixels.size() / width);
@@ -154,18 +153,18 @@ std::vector<double> eventsByLine(const CameraStatistics& camera, std::uint32_t m
   return lines;
 }
 
-/// How many lines on one side lie outside the area that has events: where these end from a line to
-/// the next. Where a scene ends, the motion blurs the end over many lines.
+/// Returns the number of lines on one side without events, if the events begin sharply from one
+/// line to the next. The end of a scene is no sharp line, because motion blurs it over many lines.
 std::size_t linesOutside(const std::vector<double>& lines) {
-  constexpr double kMinOutside = 0.07;  // of all lines: 320 columns of 346, for example
-  constexpr double kMaxEvents = 0.02;   // per line outside, of those inside
-  constexpr double kMinAtEdge = 0.3;    // per line beside the edge, of those inside
+  constexpr double kMinOutside = 0.07;  // fraction of all lines; example: 320 of 346 columns
+  constexpr double kMaxEvents = 0.02;   // per line outside, relative to a line inside
+  constexpr double kMinAtEdge = 0.3;    // per line at the edge, relative to a line inside
   const std::size_t size = lines.size();
   const std::size_t edge = std::max<std::size_t>(3, size / 50);
   double outside = 0;
   double inside = std::accumulate(lines.begin(), lines.end(), 0.0);
   std::size_t found = 0;
-  double density = 0;  // inside
+  double density = 0;  // events per line inside
   for (std::size_t k = 1; k + edge < size; ++k) {
     outside += lines[k - 1];
     inside -= lines[k - 1];
@@ -182,7 +181,7 @@ std::size_t linesOutside(const std::vector<double>& lines) {
   return static_cast<double>(found) >= kMinOutside * static_cast<double>(size) ? found : 0;
 }
 
-/// The first and the last line with events.
+/// Returns the first and the last line with events.
 std::pair<std::size_t, std::size_t> linesInside(std::vector<double> lines) {
   const std::size_t first = linesOutside(lines);
   std::reverse(lines.begin(), lines.end());
@@ -190,7 +189,7 @@ std::pair<std::size_t, std::size_t> linesInside(std::vector<double> lines) {
 }
 
 void checkSensorArea(const Cameras& cameras, Warnings& warnings) {
-  // Of the pixels of the area. With fewer, the events are of some edges of the scene alone.
+  // Fraction of active pixels in the area. With fewer, only some edges of the scene have events.
   constexpr double kMinActive = 0.2;
   for (const auto& [key, camera] : cameras) {
     std::vector<std::uint32_t> active;
@@ -200,7 +199,7 @@ void checkSensorArea(const Cameras& cameras, Warnings& warnings) {
     if (active.size() < kEnoughEvents) continue;
     const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
     std::nth_element(active.begin(), middle, active.end());
-    const std::uint32_t most = 2 * *middle;  // of a hot pixel
+    const std::uint32_t most = 2 * *middle;  // limit for a hot pixel
     const auto [left, right] = linesInside(eventsByLine(camera, most, true));
     const auto [top, bottom] = linesInside(eventsByLine(camera, most, false));
     const std::size_t area = (right - left + 1) * (bottom - top + 1);
@@ -217,8 +216,8 @@ void checkSensorArea(const Cameras& cameras, Warnings& warnings) {
 }
 
 void checkCameraClocks(const Cameras& cameras, Warnings& warnings) {
-  // Cameras of a rig are started together. Where they share less than half of the time of the
-  // shorter stream, their clocks have another zero, or the files are of two recordings.
+  // Cameras of a rig are started together. If they share less than half of the shorter stream's
+  // time, their clocks have different zeros, or the files are from two recordings.
   constexpr double kMinShared = 0.5;
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {

@@ -18,20 +18,20 @@
 
 namespace efm {
 
-/// The content of the files that RigOptions name.
+/// Content of the files that RigOptions name.
 struct RigSetup {
   std::optional<Calibration> calibration;
   std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
 };
 
-/// Options of the rig, in place of the recording's own.
+/// Options of the rig that replace the recording's own.
 struct RigOptions {
   std::filesystem::path calibration;          ///< Empty: from the recording.
   std::filesystem::path hand_eye;             ///< Empty: from the recording.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
   std::string pose_source;  ///< The label of the source's sensor; empty: the best source.
   std::shared_ptr<const RigSetup> setup =
-      nullptr;  ///< Of the two files, if they were read already.
+      nullptr;  ///< Content of both files, if they were read already.
 };
 
 /// @throws std::runtime_error naming a file that cannot be read or understood.
@@ -42,24 +42,24 @@ struct LiveOptions {
   /// false: playback. Each observation is mapped before the next one is taken, and the same
   /// observations make the same map.
   bool enabled = false;
-  /// Events per second of sensor time and camera; more are thinned evenly. 0: no limit. Depends on
-  /// the events alone, so that the same input gives the same map however loaded the machine is.
+  /// Highest event rate of a camera, events per second of sensor time; more are subsampled evenly.
+  /// 0: no limit. Depends on the events only: the same input gives the same map on any machine.
   double max_event_rate = 1'000'000;
-  /// Input that waits for the mapping: its events of all cameras, and their memory. Beyond either
-  /// one the oldest windows are given up. At least 1000 events, 1 MB.
+  /// Limits of the input that waits for the mapping: events of all cameras, and their memory. If
+  /// one limit is exceeded, the oldest windows are dropped. At least 1000 events, 1 MB.
   std::int64_t max_queue_events = 5'000'000;
   double max_queue_mb = 256;
-  /// Events wait this long for poses. Seconds, above 0, at most 3600.
+  /// Longest time that events wait for poses. Seconds, above 0, at most 3600.
   double max_pose_wait_s = 2;
-  /// Keyframes with their own clouds, for MRPT's simplemaps and for the refinement to move: the
-  /// newest ones. At least 1. The points of all stay in the map.
+  /// Number of newest keyframes that keep their own clouds, for MRPT's simplemaps and for the
+  /// refinement to move. At least 1. The points of all keyframes stay in the map.
   int max_keyframes = 1000;
-  /// A pose that is farther from the one before it, even by five standard deviations less, begins a
-  /// new stretch: no window spans both. Metres per second, degrees per second, above 0.
+  /// Largest plausible speeds of the tracker, above 0. A faster step (after subtracting 5 sigma of
+  /// its stated noise) is a tracker jump: no window uses poses from both sides of it.
   double max_speed_m_s = 50;
   double max_turn_deg_s = 1500;
 
-  /// The events that may wait, by both limits.
+  /// Returns the number of events that may wait, by both limits.
   double queueEvents() const;
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -77,23 +77,23 @@ struct LiveOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// Shortens a window that was chosen, and a stride that was chosen with it.
-/// @param reason what `max_s` comes from.
+/// Shortens an automatic window, and an automatic stride with it.
+/// @param reason why windows are at most `max_s` long.
 void limitWindow(double max_s, const std::string& reason, KeyframePolicyOptions& policy,
                  std::vector<ChosenOption>& chosen);
-/// The same, until a window's events fill at most half of the queue of live operation: the other
-/// half is for the events that come while it is mapped.
-/// @param events_per_s of all cameras together.
+/// Shortens an automatic window until its events fill at most half of the queue of live operation.
+/// The other half is for the events that arrive while the window is mapped.
+/// @param events_per_s rate of all cameras together.
 void fitIntoQueue(const LiveOptions& live, double events_per_s, KeyframePolicyOptions& policy,
                   std::vector<ChosenOption>& chosen);
 
 /// All options of an option file.
 struct EventFusionOptions {
   FusionMapperOptions mapper;
-  /// Options of the mapper whose values are chosen from the data.
+  /// The options of the mapper that are chosen from the data.
   AutomaticOptions automatic;
-  /// The cloud of a keyframe is the clouds of its single cameras, concatenated: the naive baseline
-  /// (Ghosh and Gallego 2022, Sec. 3.3.1). Depth maps stay fused.
+  /// True if the cloud of a keyframe is the concatenation of its single cameras' clouds: the naive
+  /// baseline (Ghosh and Gallego 2022, Sec. 3.3.1). Depth maps stay fused.
   bool late_fusion = false;
   GlobalCloudOptions cloud;
   MapRefinementOptions refinement;
@@ -101,20 +101,20 @@ struct EventFusionOptions {
   LiveOptions live;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.
 
-  /// How many of the newest keyframes the refinement may move.
+  /// Returns the number of newest keyframes that the refinement may move.
   std::size_t movableKeyframes() const;
   void validate() const;
 };
 
-/// Until automatic options are chosen in live operation, windows have this length and stride:
-/// options are chosen from the first one.
+/// Length and stride of windows in live operation until the automatic options are chosen. They are
+/// chosen from the first window.
 inline constexpr double kFirstWindowS = 1;
 inline constexpr double kFirstStrideS = 0.1;
 
-/// The mapper's options, with what live operation and late fusion need.
+/// Returns the mapper's options, adapted to live operation and late fusion.
 FusionMapperOptions mapperOptions(const EventFusionOptions& options);
 
-/// The options of a program that was told nothing: what can be chosen from the data is.
+/// Returns the default options of programs: each option that can be automatic is automatic.
 inline EventFusionOptions defaultOptions() {
   EventFusionOptions options;
   options.automatic = {true, true, true, true, true};

@@ -16,7 +16,7 @@
 namespace efm {
 namespace {
 
-/// Poses reach this far around the middle of a sample: see `scene_depths.h`.
+/// Time span of the poses around the middle of a sample: see `scene_depths.h`.
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 
@@ -30,7 +30,7 @@ EventPacket thinnedOut(const EventPacket& packet) {
           packet.covered_until_ns, packet.t_ns,        packet.checked};
 }
 
-/// A mistake that is named says more than that depths disagree.
+/// Returns the warning about the poses. A known mistake explains more than different depths do.
 std::optional<Warning> mistakeIn(const RecordingSurvey& survey,
                                  const FusionMapperOptions& options) {
   const auto finding = checkPoses(survey.rig, survey.samples, options);
@@ -47,10 +47,10 @@ std::optional<Warning> mistakeIn(const RecordingSurvey& survey,
 }  // namespace
 
 PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) const {
-  constexpr double kMaxChange = 0.08;  // of depths that are believed
+  constexpr double kMaxChange = 0.08;  // of reliable depths
   constexpr double kMaxLeverM = 20;
   PoseVerdict verdict;
-  if (lever_m > kMaxLeverM) {  // what follows from it would blame the poses
+  if (lever_m > kMaxLeverM) {  // further checks would blame the poses
     addWarning(verdict.warnings, "long-lever",
                "the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
                "translation of T_body_rig in metres (--hand-eye)?",

@@ -15,45 +15,45 @@
 
 namespace efm {
 
-/// What a first look says of the poses.
+/// Result of a first look at the poses.
 struct PoseVerdict {
   std::vector<Warning> warnings;
-  std::vector<std::string> doubts;  ///< Why a map rests on little evidence.
+  std::vector<std::string> doubts;  ///< Reasons why a map rests on little evidence.
 };
 
-/// Events per second of all cameras together.
+/// Returns the events per second of all cameras together.
 double eventRate(const WindowData& data);
 
-/// What a first look at a recording found: its cameras and some of its windows, evenly spread.
+/// Result of a first look at a recording: its cameras and some of its windows, evenly spread.
 struct RecordingSurvey {
   Rig rig;
   std::vector<WindowSample> samples;
-  /// The time from the first to the last event with a pose; nothing without such events.
+  /// Time from the first to the last event with a pose; std::nullopt if there is none.
   std::optional<double> duration_s;
-  /// In the window with the most, of all cameras together.
+  /// Highest event rate of a window, all cameras together.
   double most_events_per_s = 0;
-  double lever_m = 0;  ///< The longest one from the tracked body to the rig.
+  double lever_m = 0;  ///< Longest lever arm from the tracked body to the rig.
 
-  /// Whether the poses explain the events, and how much depends on them. An error is left to the
-  /// pass that maps.
-  /// @param options with the window of the map.
+  /// Judges whether the poses explain the events, and how much the depths depend on the poses.
+  /// Errors are left to the pass that maps.
+  /// @param options of the mapper, with the window of the map.
   PoseVerdict judgePoses(const FusionMapperOptions& options) const;
 };
 
-/// A first pass over a recording: takes some of its windows, evenly spread, without mapping them.
-/// Memory does not grow with the recording's length: of more than a million events per second and
-/// camera, some are chosen evenly.
+/// First pass over a recording: takes some of its windows, evenly spread, without mapping them.
+/// Memory does not grow with the recording's length: above a million events per second and camera,
+/// events are subsampled evenly.
 class FirstLook {
  public:
   explicit FirstLook(const EventFusionOptions& options);
 
-  /// @throws std::exception for a sample that a MappingSession rejects, too.
+  /// @throws std::exception if a MappingSession rejects the input, too.
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
   /// Adds a sample, unless a MappingSession rejects it or rejected an earlier one.
-  /// @return whether all samples so far were added.
+  /// @return true if all samples so far were added.
   bool take(const Sample& sample);
-  /// To be called once: after the last data, or after an error.
+  /// Returns the result. Call it once: after the last data, or after an error.
   RecordingSurvey finish();
 
  private:
@@ -67,11 +67,11 @@ class FirstLook {
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   SpreadSamples samples_;
-  std::optional<TimeSpan> events_, poses_;  // that the mapper took
+  std::optional<TimeSpan> events_, poses_;  // of the data that the mapper took
   bool takes_ = true;
   std::uint64_t received_ = 0;
   double lever_m_ = 0;
-  double most_events_per_s_ = 0;  // of those that were chosen
+  double most_events_per_s_ = 0;  // of the subsampled events
 };
 
 }  // namespace efm

@@ -28,8 +28,8 @@ namespace {
 
 using Warnings = std::vector<Warning>;
 
-/// Whether the poses would cover the events if the events' times were `factor` times larger. Almost
-/// nothing among the poses is no fit, but chance.
+/// Returns whether the poses would cover the events if the events' times were `factor` times
+/// larger. If the events span only a small part of the poses, the fit is chance.
 bool fitsWith(double factor, const TimeSpan& events, const TimeSpan& poses) {
   const double first = factor * static_cast<double>(events.first_ns);
   const double last = factor * static_cast<double>(events.last_ns);
@@ -39,7 +39,7 @@ bool fitsWith(double factor, const TimeSpan& events, const TimeSpan& poses) {
   return end - begin > 0.5 * (last - first) && last - first > 0.1 * poses_ns;
 }
 
-/// The unit of either that would let both fit; else a question.
+/// Returns the unit of events or poses with which both fit; otherwise a question.
 std::string clockGuess(const TimeSpan& events, const TimeSpan& poses) {
   double factor = 1;
   for (const char* unit : {"ms", "us", "ns"}) {
@@ -56,8 +56,8 @@ std::string clockGuess(const TimeSpan& events, const TimeSpan& poses) {
 }
 
 void checkClocks(const Findings& findings, Warnings& warnings) {
-  // Trackers start late; in a recording of a second that is a large fraction. Another clock or
-  // another unit leaves nothing.
+  // Trackers start late, which is a large fraction of a recording of a second. With another clock
+  // or another unit, nothing overlaps.
   constexpr double kMinOverlap = 0.9;
   constexpr double kStartS = 0.1;
   const auto events = findings.events();
@@ -127,7 +127,7 @@ void checkSpeeds(const Findings& findings, Warnings& warnings) {
   }
 }
 
-/// Without the parts that are missing, a map ends with an error.
+/// Warns of missing parts before a map. With a map, missing parts are an error.
 void checkParts(const Findings& findings, Warnings& warnings) {
   if (findings.session) return;
   std::map<int, CameraModel> cameras;
@@ -157,7 +157,7 @@ void Findings::use(const DepthPlanesOptions& planes, const std::vector<ChosenOpt
   const bool is_chosen = std::any_of(chosen.begin(), chosen.end(), [](const ChosenOption& option) {
     return option.key == "min_depth_m";
   });
-  // A nearer limit that was chosen may follow from wrong poses.
+  // An automatic limit may be too near because of wrong poses.
   near_depth_m = is_chosen ? std::max(planes.min_depth_m, near_depth_m) : planes.min_depth_m;
   far_depth_m = planes.max_depth_m;
 }
@@ -208,7 +208,7 @@ std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
 }
 
 void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
-  // A depth counts as near a limit within this fraction of the range of inverse depth.
+  // Fraction of the range of inverse depth in which a depth counts as near a limit.
   constexpr double kNear = 0.02;
   const double nearest = 1 / planes_.min_depth_m;
   const double farthest = 1 / planes_.max_depth_m;
@@ -234,7 +234,7 @@ void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
   }
 }
 
-/// Projects the points of the last keyframe into this one, and compares depths.
+/// Projects the points of the last keyframe into this keyframe, and compares depths.
 void DepthStatistics::compareWithLast(const KeyframeDepthMap& keyframe) {
   constexpr double kWithin = 1.105;
   const Rigid3 T_ref_last = keyframe.T_world_ref.inverse() * last_.T_world_ref;
@@ -260,16 +260,16 @@ void DepthStatistics::compareWithLast(const KeyframeDepthMap& keyframe) {
   }
 }
 
-// Measured on 260 maps of one camera and of two, with clocks up to 50 ms off: with the right clock,
-// keyframes of one camera in a row agree in 55 to 95 % of the points that they share, in its wrong
-// maps in less than half; of a rig in 84 % and more. Of 260 others, one right map has 37 %.
+// Measured on 260 maps of one and two cameras, with clocks up to 50 ms off. One camera, right
+// clock: consecutive keyframes agree in 55 to 95 % of their shared points; wrong maps: in less than
+// half. Rig: 84 % or more. Among 260 other maps, one right map has 37 %.
 std::vector<std::string> DepthStatistics::doubts() const {
   constexpr std::uint64_t kMinShared = 100;
   constexpr double kMinAgreeing = 0.5;
   constexpr double kMinParallaxPx = 1.5;
-  constexpr double kAlonePx = 2;  // where hardly a point of another keyframe confirms the depths
+  constexpr double kAlonePx = 2;  // if hardly any point of another keyframe confirms the depths
   constexpr std::uint64_t kConfirmed = 1000;
-  constexpr double kMaxAtEnds = 0.4;  // of the pixels with contrast
+  constexpr double kMaxAtEnds = 0.4;  // fraction of the pixels with contrast
   std::vector<std::string> doubts;
   const double agreeing = static_cast<double>(agreeing_) / static_cast<double>(shared_);
   if (shared_ >= kMinShared && agreeing < kMinAgreeing) {
@@ -297,12 +297,12 @@ std::vector<std::string> DepthStatistics::doubts() const {
 }
 
 std::vector<Warning> DepthStatistics::warnings() const {
-  // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: with limits around
-  // the scene at most 2.4 %; with much of the scene beyond a limit 7 to 74 % in eight of ten cases.
-  // It is not more, because most pixels without a peak inside the limits are rejected.
+  // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: at most 2.4 % with
+  // limits around the scene; 7 to 74 % in eight of ten cases with much of the scene beyond a limit.
+  // The fraction is not larger because most pixels without a peak inside the limits are rejected.
   constexpr double kMaxFraction = 0.06;
-  constexpr std::uint64_t kMinDepths = 100;  // fewer may lie there by chance
-  constexpr int kMinPlanes = 50;             // with fewer, the limit's plane alone has many depths
+  constexpr std::uint64_t kMinDepths = 100;  // fewer may be at a limit by chance
+  constexpr int kMinPlanes = 50;             // with fewer, the limit's own plane has many depths
   Warnings warnings;
   if (depths_ < kMinDepths || planes_.num_planes < kMinPlanes) return warnings;
   const auto check = [&](std::uint64_t count, const char* which, double limit_m, const char* key) {

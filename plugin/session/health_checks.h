@@ -28,28 +28,28 @@
 
 namespace efm {
 
-/// Whether a recording knows the camera's calibration. Without one, the focal length is 0.
+/// Returns whether the recording has the camera's calibration. Without it, the focal length is 0.
 bool isCalibrated(const CameraModel& model);
 
-/// Horizontal and vertical field of view, radians: of the pinhole, or, for a fisheye lens, of its
-/// angles in proportion to the distance from the centre. The distortion is left out, so it is
-/// defined for any coefficients.
+/// Returns the horizontal and vertical field of view, radians. Fisheye lens: the image's angle is
+/// proportional to the distance from the centre; other lenses: pinhole. Distortion is left out, so
+/// the result is defined for any coefficients.
 Eigen::Vector2d fieldOfView(const CameraModel& model);
 
-/// Distance of two cameras on the rig, metres.
+/// Returns the distance of two cameras on the rig, metres.
 double baselineOf(const RigCamera& a, const RigCamera& b);
 
-/// Counts what became of the pixels of keyframes, and depths near the limits.
+/// Counts the pixels of keyframes by their result, and depths near the limits.
 class DepthStatistics {
  public:
-  /// @param chosen the options that were automatic: their limits are not the user's.
+  /// @param chosen the options that were automatic: the user did not set these limits.
   explicit DepthStatistics(const DepthPlanesOptions& planes, std::vector<ChosenOption> chosen = {})
       : planes_(planes), chosen_(std::move(chosen)) {}
 
   void add(const KeyframeDepthMap& keyframe);
   std::vector<Warning> warnings() const;
   const PixelCounts& pixels() const { return pixels_; }
-  /// Why the depths rest on little evidence; empty where they do not.
+  /// Returns the reasons why the depths rest on little evidence; empty if there are none.
   std::vector<std::string> doubts() const;
 
  private:
@@ -58,39 +58,39 @@ class DepthStatistics {
   DepthPlanesOptions planes_;
   std::vector<ChosenOption> chosen_;
   PixelCounts pixels_;
-  KeyframeDepthMap last_;              // depths, view and pose
-  std::uint64_t shared_ = 0;           // points that two keyframes in a row have
-  std::uint64_t agreeing_ = 0;         // with the same depth
-  std::vector<double> parallaxes_px_;  // of the median depth of each keyframe
+  KeyframeDepthMap last_;              // its depths, view and pose
+  std::uint64_t shared_ = 0;           // points that two consecutive keyframes have
+  std::uint64_t agreeing_ = 0;         // shared points with the same depth
+  std::vector<double> parallaxes_px_;  // of each keyframe, at its median depth
   std::uint64_t depths_ = 0;
-  std::uint64_t nearest_ = 0;   // near the nearest plane
-  std::uint64_t farthest_ = 0;  // near the farthest plane
+  std::uint64_t nearest_ = 0;   // depths near the nearest plane
+  std::uint64_t farthest_ = 0;  // depths near the farthest plane
 };
 
-/// What is known of a recording and, after it was mapped, of its map.
+/// Findings about a recording and, after the mapping, about its map.
 struct Findings {
   const RecordingStatistics& recording;
   RecordingCounts read;
-  std::int64_t until_ns = kMaxTimeNs;  ///< The recording was read until this time.
-  double near_depth_m = 0.5;           ///< The nearest depth that the motion is compared with.
+  std::int64_t until_ns = kMaxTimeNs;  ///< Time until which the recording was read.
+  double near_depth_m = 0.5;           ///< Nearest depth of the scene, to judge the motion.
   double far_depth_m = 5;
-  double max_pose_gap_s = 0.25;  ///< Events in longer gaps are not used.
+  double max_pose_gap_s = 0.25;  ///< Events in longer gaps between poses are not used.
 
-  // After the mapping; otherwise null.
+  // Set after the mapping; null before.
   const SessionStatus* session = nullptr;
   const FusionMapperOptions* options = nullptr;
   const DepthStatistics* depths = nullptr;
 
-  /// With the depths that a map uses.
+  /// Takes the depth limits of a map.
   void use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);
-  /// First and last event of all cameras.
+  /// Returns the times of the first and the last event of all cameras.
   std::optional<TimeSpan> events() const;
 };
 
-/// All warnings about a recording and its map: the one function for each program.
+/// Returns all warnings about a recording and its map. Every program uses this function.
 std::vector<Warning> warningsOf(const Findings& findings);
 
-/// Adds a warning: its name, and its text in fmt's format.
+/// Adds a warning with a name and a text in fmt's format.
 template <typename... Values>
 void addWarning(std::vector<Warning>& warnings, const char* name,
                 fmt::format_string<Values...> text, Values&&... values) {
@@ -104,41 +104,41 @@ void append(std::vector<Value>& all, std::vector<Value> more) {
 
 // The parts of `warningsOf`, in files of their own.
 
-/// What is implausible about the cameras: their calibration, and their events.
+/// Checks the cameras: their calibration, and their events.
 void checkCameras(const Findings& findings, std::vector<Warning>& warnings);
-/// What is implausible about the motion of the poses beside the events: poses that repeat
-/// (`poses-frozen`), steps that the tracker otherwise does not make (`pose-jump`), and motion that
-/// is interpolated over more than 0.1 s (`pose-interpolation`).
+/// Checks the motion of the poses against the events: repeated poses (`poses-frozen`), steps that
+/// are unusual for the tracker (`pose-jump`), and motion that is interpolated over more than 0.1 s
+/// (`pose-interpolation`).
 void checkMotion(const Findings& findings, std::vector<Warning>& warnings);
-/// What a finished session did not use, and where its map has holes.
+/// Checks a finished session: unused data, and holes in the map.
 void checkSession(const Findings& findings, std::vector<Warning>& warnings);
 
-/// The parts that a recording lacks for a map: events, calibration, poses.
+/// Returns a warning for each missing part of a recording: events, calibration, poses.
 /// @param cameras by their index.
 std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
                                   bool has_poses);
 
-/// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
-/// events that were left out.
+/// Returns the warnings of the readers, and those of lost packets, of events without a time and of
+/// skipped events.
 std::vector<Warning> lossWarnings(const RecordingCounts& counts);
 
-/// Automatic options were chosen without a scene.
+/// Returns the warning that automatic options were chosen without a scene.
 Warning noSceneWarning();
 
-/// Says in a sentence why a finished session made no keyframe: no events, no poses, poses and
-/// events that miss each other (by how much), noise alone, or too few of both for one window.
+/// Returns a sentence that says why a finished session made no keyframe: no events, no poses, poses
+/// and events at different times (by how much), noise alone, or too little of both for one window.
 OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
 
-/// Says what is wrong about the poses, and the option or file that would mend it.
-/// @param rig with which it was found.
+/// Returns the warning about wrong poses, with the option or file that fixes them.
+/// @param rig with which the mistake was found.
 Warning poseWarning(const PoseFinding& finding, const Rig& rig);
 
-/// Says how the depths of the rig and those of its motion differ: `scale` or `depths-disagree`.
-/// @return nothing where they agree.
+/// Warns if the depths of the rig and those of its motion differ: `scale` or `depths-disagree`.
+/// @return std::nullopt if they agree.
 std::optional<Warning> agreementWarning(const DepthAgreement& agreement);
 
-/// Says how much the depths change with the clock and the travel of the poses: `depths-sensitive`.
-/// @return nothing where 10 ms change less than the depths' standard deviation.
+/// Warns if depths depend much on the clock and the travel of the poses: `depths-sensitive`.
+/// @return std::nullopt if 10 ms change the depths by less than their standard deviation.
 std::optional<Warning> sensitivityWarning(const DepthSensitivity& sensitivity);
 
 }  // namespace efm

@@ -22,7 +22,7 @@ std::uint64_t bytesOf(const EventPacket& packet) {
   return sizeof(EventPacket) + packet.events.capacity() * sizeof(Event);
 }
 
-/// Without overflow: times are not checked yet.
+/// Compares without overflow, because times are not checked yet.
 bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns = kFarAheadNs) {
   return t_ns > other_ns &&
          static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
@@ -136,15 +136,15 @@ void InputQueue::pass(Camera& camera, EventPacket packet) {
   push(std::move(packet));
 }
 
-/// Refuses each event that is far ahead of those before and after it. One at the end of the packet
-/// waits; this packet decides about the one that waited.
+/// Rejects each event that is far ahead of the events before and after it. An event at the end of
+/// the packet waits for the next packet. This packet decides about the waiting event.
 void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
   std::vector<Event>& events = packet.events;
   Stream<EventPacket>& stream = camera.stream;
   const std::optional<std::int64_t> begin_ns =
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
   const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
-  if (confirms || !events.empty()) {  // a cover alone refuses nothing
+  if (confirms || !events.empty()) {  // `covered_until_ns` alone rejects nothing
     if (auto waited = stream.settle(confirms, camera.counts.fates[EventFate::kRefused])) {
       pass(camera, std::move(*waited));
     }
@@ -156,7 +156,7 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
       if (i + 1 == events.size()) {
         stream.ahead = EventPacket{packet.camera, packet.calibration, {event}, std::nullopt};
         stream.ahead_ns = event.t_ns;
-        if (packet.covered_until_ns) {  // it may end with this event
+        if (packet.covered_until_ns) {  // the packet may end with this event
           packet.covered_until_ns = std::min(*packet.covered_until_ns, *stream.reached_ns);
         }
         continue;

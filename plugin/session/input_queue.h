@@ -17,27 +17,27 @@
 
 namespace efm {
 
-/// Thins the events of one camera to a rate of sensor time: of each 10 ms of the camera's clock at
-/// most a hundredth of the rate, spread evenly (`EvenChoice`). The choice depends on the events in
-/// their order of arrival, not on the packets that they arrive in, nor on the machine.
+/// Subsamples the events of one camera to a rate of sensor time. Of each 10 ms of the camera's
+/// clock, at most rate / 100 events pass, spread evenly (`EvenChoice`). The choice depends on the
+/// order of the events, not on the packets in which they arrive, nor on the machine.
 ///
-/// The events of the current 10 ms are held until a later event, or a packet's cover, ends it. A
-/// late event, of the second before, belongs to the current 10 ms. After a step of the clock
-/// another interval is the current one.
+/// The events of the current 10 ms are held until a later event, or a packet's `covered_until_ns`,
+/// ends the interval. A late event, by less than a second, belongs to the current 10 ms. After a
+/// clock reset, the current interval is one of the new clock.
 class EventBudget {
  public:
   /// @param max_rate events per second; 0: all events pass at once.
   explicit EventBudget(double max_rate);
 
-  /// @param covered_until_ns no event before this time is still to come; in: of the packet, out: of
+  /// @param covered_until_ns no event before this time can still arrive; in: of the packet, out: of
   /// the events that passed.
-  /// @return the events that pass, of this packet and of earlier ones.
+  /// @return the events that pass, of this packet and of earlier packets.
   std::vector<Event> pass(std::vector<Event> events, std::optional<std::int64_t>& covered_until_ns);
-  /// The rest, at the end.
+  /// Returns the held events that pass at the end.
   std::vector<Event> finish();
 
   std::uint64_t thinned() const { return thinned_; }
-  /// Events that wait for the end of their 10 ms.
+  /// Returns the number of events that wait for the end of their 10 ms.
   std::size_t held() const { return held_.size(); }
 
  private:
@@ -45,75 +45,75 @@ class EventBudget {
 
   std::size_t max_per_interval_;
   std::int64_t interval_ = 0;  // number of the current 10 ms
-  std::vector<Event> held_;    // its events
+  std::vector<Event> held_;    // events of this interval
   std::uint64_t thinned_ = 0;
 };
 
-/// Takes the place of a packet that is not to be mapped.
+/// Returns a packet without events that replaces a packet that is not to be mapped.
 EventPacket skippedPacket(const EventPacket& packet);
 
-/// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
-/// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
-/// one takes. Adding never waits for the mapping.
+/// Input of a mapping that runs in another thread: subsampled, and bounded in events and in bytes.
+/// If the queue is full, its oldest packets are dropped, but never poses. Any thread adds; one
+/// thread takes. Adding never waits for the mapping.
 ///
-/// An event, or a pose, that is over a second ahead of its stream waits for the next one: where
-/// that is back, the one ahead is refused alone.
+/// An event or pose that is over a second ahead of its stream waits for the next one of its stream.
+/// If the next one is back at the former time, only the event or pose that was ahead is rejected.
 class InputQueue {
  public:
   explicit InputQueue(const LiveOptions& options);
 
-  /// @throws std::invalid_argument where an event lies outside the sensor, or the calibration is
-  /// not that of the camera's earlier packets: the packet is refused.
+  /// @throws std::invalid_argument if an event lies outside the sensor, or the calibration differs
+  /// from the camera's earlier packets. The packet is rejected.
   void add(EventPacket packet);
   void add(PoseSample pose);
-  /// Counts a packet that is not to be mapped. A `skippedPacket` takes its place.
+  /// Counts a packet that is not to be mapped, and adds its `skippedPacket`.
   void skip(const EventPacket& packet);
-  /// No more input will come. Packets and poses that are added afterwards are counted.
+  /// Ends the input. Packets and poses that are added later are counted only.
   void end();
-  /// Wakes up the thread that takes, for good.
+  /// Wakes up the thread that takes. It does not wait again.
   void stop();
 
   struct Batch {
-    std::vector<PoseSample> poses;  ///< In the order they came.
+    std::vector<PoseSample> poses;  ///< In the order of arrival.
     std::vector<EventPacket> packets;
-    /// The cameras with dropped packets, which are older than `packets`.
+    /// Missing events of the cameras with dropped packets, which are older than `packets`.
     std::map<int, MissingEvents> missing;
     bool ended = false;
   };
   using Clock = std::chrono::steady_clock;
-  /// Waits for input, at most until then. Gives packets up to the next skipped one: the windows
-  /// before the gap are mapped before it.
+  /// Waits for input, at most until this time. Returns packets up to the next skipped one: the
+  /// windows before the gap are mapped first.
   Batch wait(std::optional<Clock::time_point> until = std::nullopt);
-  /// The input that is there, up to the next skipped packet. Skipped packets themselves are given
-  /// if all complete windows are mapped, as they are before `wait`.
+  /// Returns the available input, up to the next skipped packet. If `all_mapped` (all complete
+  /// windows are mapped, as before `wait`), the input begins with the skipped packets.
   Batch take(bool all_mapped = false);
 
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
-  /// Poses that came after the end, or were far ahead of their source.
+  /// Returns the number of poses that came after the end, or were far ahead of their source.
   std::uint64_t refusedPoses() const;
 
  private:
-  /// How far a stream of input has come.
+  /// Progress of a stream of input.
   template <typename Input>
   struct Stream {
-    std::optional<std::int64_t> reached_ns;  // the newest time that is not ahead
-    std::optional<Input> ahead;              // until the next one confirms its time
+    std::optional<std::int64_t> reached_ns;  // newest time that is not ahead
+    std::optional<Input> ahead;              // waits until the next input confirms its time
     std::int64_t ahead_ns = 0;
 
-    /// The newest time, of a clock that may go back.
+    /// Takes a new time. The clock may go back.
     void follow(std::int64_t t_ns);
-    /// Ends the wait. @return what waited, if its time is right; otherwise it counts as refused.
+    /// Ends the wait of `ahead`. @return it, if its time is right; otherwise it counts as rejected.
     std::optional<Input> settle(bool is_right, std::uint64_t& refused);
-    /// At the end of the input.
+    /// Ends the wait at the end of the input.
     std::optional<Input> settleLast(std::uint64_t& refused);
   };
 
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
-    std::optional<EventPacket> last;  // without events
-    Stream<EventPacket> stream;       // of events and covers; one event may wait
+    std::optional<EventPacket> last;  // last packet, without its events
+    Stream<EventPacket> stream;       // of events and `covered_until_ns`; one event may wait
     QueueCounts counts;
   };
 
@@ -127,7 +127,7 @@ class InputQueue {
 
   const LiveOptions options_;
 
-  mutable std::mutex mutex_;  // of the members below
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
   std::map<int, Camera> cameras_;
   std::deque<EventPacket> packets_;

@@ -9,7 +9,7 @@
 namespace efm {
 namespace {
 
-/// Poses wait for events so long.
+/// Longest time that poses wait for events.
 constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
 
 }  // namespace

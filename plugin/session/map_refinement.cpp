@@ -8,7 +8,7 @@
 namespace efm {
 namespace {
 
-/// More waiting keyframes lose their points.
+/// Number of waiting keyframes with points; further keyframes lose their points.
 constexpr std::size_t kMaxWaiting = 50;
 
 std::string textOf(const std::exception_ptr& error) {
@@ -72,7 +72,7 @@ void MapRefinement::finish() {
     changed_.notify_all();
     changed_.wait(lock, [this] { return waiting_.size() == held_; });
   }
-  // The thread is idle: the refiner may be used here.
+  // The thread is idle, so the refiner may be used here.
   work([this] { refiner_.finish(); });
 }
 
@@ -108,7 +108,7 @@ RefinementState MapRefinement::state() const {
   return state;
 }
 
-/// @return whether the refiner has the keyframe. Otherwise the task has lost its points.
+/// @return true if the refiner has the keyframe. Otherwise the task has lost its points.
 bool MapRefinement::refine(Task& task) {
   const std::size_t number = refiner_.keyframes();
   work([&] { refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated); });
@@ -155,13 +155,13 @@ void MapRefinement::runInBackground() {
   while (true) {
     changed_.wait(lock, [this] { return stop_ || waiting_.size() > held_; });
     if (stop_) return;
-    Task& task = waiting_.front();  // stays where it is when others are added
+    Task& task = waiting_.front();  // a deque does not move it when tasks are added
     const std::size_t waiting = waiting_.size();
     lock.unlock();
     const bool refined = refine(task);
     lock.lock();
     if (refined) waiting_.pop_front();
-    held_ = refined ? 0 : waiting;  // it is tried again with the next keyframe
+    held_ = refined ? 0 : waiting;  // tried again with the next keyframe
     changed_.notify_all();
   }
 }

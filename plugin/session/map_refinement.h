@@ -19,39 +19,39 @@ namespace efm {
 
 struct MapRefinementOptions {
   bool enabled = false;
-  /// Refine in a thread of its own while the mapping goes on: for live operation. Otherwise each
-  /// keyframe is refined before the next one is made, and the same recording gives the same map.
+  /// True: refine in a background thread while the mapping continues (live operation). False:
+  /// refine each keyframe before the next one is made; the same recording gives the same map.
   bool background = false;
   RefinementOptions refiner;
 };
 
-/// The state of a refinement so far.
+/// State of a refinement so far.
 struct RefinementState {
-  Rigid3 T_world_odom;          ///< Takes the tracker's newest poses to the refined world.
-  Rigid3 T_world_ref_denoised;  ///< The newest keyframe's, without its noise.
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of a pose there: see KeyframeRefiner.
+  Rigid3 T_world_odom;          ///< Maps the tracker's newest poses to the refined world.
+  Rigid3 T_world_ref_denoised;  ///< Pose of the newest keyframe, without its noise.
+  Matrix6d covariance = Matrix6d::Zero();  ///< Covariance of a pose there: see KeyframeRefiner.
   RefinementCounts counts;
-  TrackerErrors tracker;    ///< As estimated.
-  std::size_t waiting = 0;  ///< Keyframes not refined yet.
-  /// Errors so far. A keyframe whose refinement fails keeps the tracker's motion.
+  TrackerErrors tracker;    ///< Estimated errors of the tracker.
+  std::size_t waiting = 0;  ///< Number of keyframes that are not refined yet.
+  /// Number of errors so far. If its refinement fails, a keyframe keeps the tracker's motion.
   std::uint64_t failures = 0;
-  std::string last_error;   ///< Of the last failure; empty without one.
+  std::string last_error;   ///< Text of the last error; empty without errors.
   double seconds = 0;       ///< Time spent refining.
-  double cpu_seconds = 0;   ///< Processor time of it.
-  double most_seconds = 0;  ///< The longest time of one keyframe.
+  double cpu_seconds = 0;   ///< Processor time spent refining.
+  double most_seconds = 0;  ///< Longest time spent on one keyframe.
 };
 
-/// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest
-/// keyframe's covariance, moved to the rig along the lever arm between both, plus the drift over
-/// the distance from the keyframe.
+/// Returns the covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the
+/// newest keyframe's covariance, moved to the rig along the lever arm between both, plus the drift
+/// over the distance from the keyframe.
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 
-/// Refines keyframes one after the other, by option in a background thread. One thread calls it.
+/// Refines keyframes one after the other, optionally in a background thread. One thread calls it.
 /// `finish` waits for the refinement; `add` waits only without the background thread. If the
-/// background thread is 50 keyframes behind, the next keyframes are added without their points:
-/// they keep the tracker's motion. So does a keyframe whose refinement fails; the next one is
-/// refined again. `state` counts failures. Without the background thread, `throwFailure` throws
-/// them.
+/// background thread is 50 keyframes behind, further keyframes are added without their points: they
+/// keep the tracker's motion. If the refinement of a keyframe fails, it keeps the tracker's motion,
+/// too; the next keyframe is refined again. `state` counts failures. Without the background thread,
+/// `throwFailure` throws them.
 class MapRefinement {
  public:
   explicit MapRefinement(const MapRefinementOptions& options);
@@ -61,7 +61,7 @@ class MapRefinement {
   MapRefinement& operator=(const MapRefinement&) = delete;
 
   /// Adds the next keyframe; keyframes are numbered from 0.
-  /// @param stated the noise that the tracker states for its pose.
+  /// @param stated noise that the tracker states for the keyframe's pose.
   /// @return T_world_ref as known now.
   /// @throws std::invalid_argument as KeyframeRefiner::requireUsable. After any error the keyframe
   /// is not added.
@@ -69,15 +69,15 @@ class MapRefinement {
   /// Waits for all keyframes and solves them together.
   void finish();
 
-  /// Counts an error of the caller, who could not use a refined pose.
+  /// Counts an error of the caller that could not use a refined pose.
   void fail(std::exception_ptr error) noexcept;
-  /// Without the background thread: throws the first failure since the last call, if there was one.
+  /// Throws the first failure since the last call, but nothing with a background thread.
   void throwFailure();
 
-  /// T_world_ref of a keyframe that is not added yet, by its pose of the tracker.
+  /// Returns T_world_ref of a keyframe that is not added yet, from its pose by the tracker.
   Rigid3 predict(const Rigid3& T_odom_ref) const;
 
-  /// T_world_ref of the keyframes that moved since the last call, by their numbers.
+  /// Returns T_world_ref of the keyframes that moved since the last call, by their numbers.
   std::map<std::size_t, Rigid3> takeMoved();
   RefinementState state() const;
 
@@ -95,12 +95,12 @@ class MapRefinement {
   void runInBackground();
 
   MapRefinementOptions options_;
-  KeyframeRefiner refiner_;  // used by the thread while there is one
+  KeyframeRefiner refiner_;  // used by the background thread alone, if there is one
 
-  mutable std::mutex mutex_;  // of the members below
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
-  std::deque<Task> waiting_;  // the first one is in work
-  std::size_t held_ = 0;      // as many wait until there are more: the first one found no memory
+  std::deque<Task> waiting_;  // the first one is being refined
+  std::size_t held_ = 0;      // number that waits for another keyframe: no memory for the first one
   bool stop_ = false;
   std::exception_ptr last_failure_;
   std::exception_ptr unthrown_;

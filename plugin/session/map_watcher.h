@@ -12,11 +12,11 @@
 
 namespace efm {
 
-/// A map right after a keyframe.
+/// Snapshot of a map right after a keyframe.
 struct WatchedMap {
-  KeyframeDepthMap keyframe;            ///< The newest one.
-  DepthPlanesOptions planes;            ///< The limits of its depths.
-  MapCloud::ConstPtr points;            ///< Of the whole map.
+  KeyframeDepthMap keyframe;            ///< The newest keyframe.
+  DepthPlanesOptions planes;            ///< The limits of the depths.
+  MapCloud::ConstPtr points;            ///< Points of the whole map.
   std::vector<StampedPose> trajectory;  ///< T_world_ref of all keyframes; not empty.
   std::vector<std::string> lines;       ///< Counts and rates, as text.
 };
@@ -25,22 +25,22 @@ struct WatchedMap {
 class MapWatcher {
  public:
   virtual ~MapWatcher() = default;
-  /// Whether it wants a snapshot now. A snapshot costs an export of the map.
-  /// @param is_last asked once more after the last keyframe.
+  /// Returns whether it wants a snapshot now. A snapshot costs an export of the map.
+  /// @param is_last true in the additional call after the last keyframe.
   virtual bool due(bool is_last) = 0;
-  /// @throws std::runtime_error if it cannot be shown; that ends the mapping.
+  /// @throws std::runtime_error if the snapshot cannot be shown. This ends the mapping.
   virtual void show(WatchedMap snapshot) = 0;
 };
 
-/// A window with the growing map. It draws copies in threads of its own, at most ten a second, and
-/// asks for a snapshot so seldom that exporting the map takes less than a twentieth of the time.
-/// The mouse turns the view, moves and zooms it; from then on the view follows the map no more.
+/// Window with the growing map. It draws copies in threads of its own, at most ten a second. It
+/// asks for few snapshots: exporting the map takes less than a twentieth of the time. The mouse
+/// turns, moves and zooms the view; after that, the view does not follow the map any more.
 class MapWindow : public MapWatcher {
  public:
-  /// Whether the user has not closed it.
+  /// Returns false after the user closed the window.
   virtual bool isOpen() = 0;
-  /// Draws the last snapshot and returns when the user closes the window or presses a key in it, or
-  /// as soon as `stop` is true.
+  /// Draws the last snapshot. Returns when the user closes the window or presses a key in it, or
+  /// when `stop` returns true.
   virtual void wait(const std::function<bool()>& stop) = 0;
 };
 

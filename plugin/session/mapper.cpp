@@ -12,7 +12,7 @@
 namespace efm {
 namespace {
 
-/// Making snapshots of the map may take this part of the time.
+/// Snapshots of the map may take 1 / this of the time.
 constexpr int kMapCostDivisor = 20;
 
 std::string errorText() {
@@ -47,7 +47,7 @@ Mapper::Mapper(const EventFusionOptions& options, Callbacks callbacks,
   queue_ = std::make_unique<InputQueue>(options_);
   status_ = session_.status();
   map_ = makeSnapshot(true);
-  thread_ = std::thread([this] {  // it waits: nobody can add input before this returns
+  thread_ = std::thread([this] {  // waits: no input before the constructor returns
     worker_ = std::this_thread::get_id();
     run();
     worker_ = std::thread::id();
@@ -110,7 +110,7 @@ void Mapper::finish() {
 
 void Mapper::stop() {
   if (!queue_) {
-    const std::lock_guard<std::mutex> lock(session_mutex_);  // after the current keyframe
+    const std::lock_guard<std::mutex> lock(session_mutex_);  // waits for the current keyframe
     stopped_ = true;
     return;
   }
@@ -121,11 +121,11 @@ void Mapper::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-/// One turn in the caller's thread.
+/// Feeds and maps a batch in the caller's thread.
 void Mapper::workHere(Batch batch) {
   std::exception_ptr error;
   feed(std::move(batch), error);
-  while (mapNext(error)) {  // a rejected sample does not stop the mapping of earlier ones
+  while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
   }
   if (error) std::rethrow_exception(error);
 }
@@ -133,15 +133,15 @@ void Mapper::workHere(Batch batch) {
 void Mapper::run() {
   std::exception_ptr error;
   for (bool goes_on = true; goes_on;) {
-    attempt(error, Fault::kMapping, "the input", [&] { goes_on = runOnce(); });  // no memory
+    attempt(error, Fault::kMapping, "the input", [&] { goes_on = runOnce(); });  // may lack memory
   }
-  endRun(nullptr);  // stopped: nobody waits for the end any more
+  endRun(nullptr);  // if stopped, nobody waits for the end
 }
 
-/// @return whether more may come.
+/// @return true if more input may come.
 bool Mapper::runOnce() {
   std::exception_ptr error;
-  // A snapshot that was put off is made as soon as it may be.
+  // A delayed snapshot is made when its time has come.
   Batch batch =
       map_changed_ ? queue_->wait(map_renewed_ + kMapCostDivisor * map_cost_) : queue_->wait();
   do {
@@ -174,8 +174,8 @@ void Mapper::endRun(std::exception_ptr error) {
 }
 
 /// Feeds the session.
-/// @param error receives the first error. In live operation, where `attempt` counts and logs
-/// errors, it is that of the end alone.
+/// @param error receives the first error; in live operation only an error of the end, because
+/// `attempt` counts and logs the others.
 void Mapper::feed(Batch batch, std::exception_ptr& error) {
   std::exception_ptr ignored;
   std::exception_ptr& of_input = queue_ ? ignored : error;
@@ -207,16 +207,16 @@ void Mapper::feed(Batch batch, std::exception_ptr& error) {
   publishState(of_input);
 }
 
-/// @return whether it made a keyframe, or dropped one in live operation.
+/// @return true if it made a keyframe, or dropped a window in live operation.
 bool Mapper::mapNext(std::exception_ptr& error) {
   std::optional<KeyframeDepthMap> keyframe;
   std::vector<std::string> warnings;
   bool goes_on = false;
   {
     const std::lock_guard<std::mutex> lock(session_mutex_);
-    // Within a callback in playback, the caller of the callback goes on mapping.
+    // Within a callback in playback, the caller of the callback maps.
     if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
-    if (queue_) {  // the newest input wins: what waits is bounded
+    if (queue_) {  // old windows are dropped for the newest input
       attempt(error, Fault::kMapping, "the input that waits", [&] {
         session_.limitHeld(options_.queueEvents() - static_cast<double>(queue_->queuedEvents()));
       });
@@ -262,7 +262,7 @@ bool Mapper::mapNext(std::exception_ptr& error) {
   return goes_on;
 }
 
-/// One warning per camera. The status counts the keyframes that lack its events.
+/// Returns at most one warning per camera. The status counts the keyframes without its events.
 std::vector<std::string> Mapper::warningsOfSilence(const KeyframeDepthMap& keyframe) {
   std::vector<std::string> warnings;
   for (const int camera : keyframe.silent_cameras) {
@@ -273,7 +273,7 @@ std::vector<std::string> Mapper::warningsOfSilence(const KeyframeDepthMap& keyfr
   return warnings;
 }
 
-/// Adds a keyframe to the map so far. If memory runs out, the caller undoes what was added.
+/// Adds a keyframe to the map so far. If memory runs out, the caller removes the keyframe.
 void Mapper::keep(StoredKeyframe keyframe) {
   const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
   map_so_far_.trajectory.push_back(pose);
@@ -281,14 +281,14 @@ void Mapper::keep(StoredKeyframe keyframe) {
   map_so_far_.keyframes.push_back(std::move(keyframe));
 }
 
-/// Live operation: the clouds of the newest keyframes are kept.
+/// Forgets the cloud of the oldest keyframe if there are too many, in live operation.
 void Mapper::forgetOldest() {
   std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
   if (!options_.enabled || keyframes.size() <= std::size_t(options_.max_keyframes)) return;
   keyframes.erase(keyframes.begin());
 }
 
-/// Moves cloud and keyframes to their refined poses, so that all parts agree.
+/// Makes a snapshot. Moves cloud and keyframes to their refined poses before, so that they agree.
 std::shared_ptr<MapSnapshot> Mapper::makeSnapshot(bool with_points) {
   session_.applyPending();
   const std::vector<Rigid3>& T_world_ref = session_.T_world_ref();
@@ -315,7 +315,7 @@ std::shared_ptr<const MapSnapshot> Mapper::newest(bool with_points) {
   return makeSnapshot(with_points);
 }
 
-/// Live operation: renews the snapshot, unless this would take too large a part of the time.
+/// Renews the snapshot in live operation, unless this would take too much of the time.
 void Mapper::publishMap(bool at_once, std::exception_ptr& error) {
   const Clock::time_point begin = Clock::now();
   const bool is_due = map_changed_ && begin - map_renewed_ >= kMapCostDivisor * map_cost_;
@@ -337,8 +337,8 @@ void Mapper::publishMap(bool at_once, std::exception_ptr& error) {
   callBack(error, "the callback of the map", [&] { callbacks_.on_map(made); });
 }
 
-/// Logs a choice of options. In live operation renews the state, and logs failed refinements, which
-/// the caller gets in playback.
+/// Logs a choice of options. In live operation it renews the state and logs failed refinements; in
+/// playback the caller gets these errors.
 void Mapper::publishState(std::exception_ptr& error) {
   SessionStatus status;
   bool is_new_choice = false;
@@ -414,8 +414,8 @@ void Mapper::setClock(ProcessorClock clock) {
   clock_ = std::move(clock);
 }
 
-/// Runs a step. What it throws is the caller's in playback; in live operation it is counted.
-/// @param error keeps the first one.
+/// Runs a step. Its exception goes to the caller in playback, and is counted in live operation.
+/// @param error keeps the first exception.
 template <typename Step>
 bool Mapper::attempt(std::exception_ptr& error, Fault fault, const char* doing, const Step& step) {
   try {
@@ -428,7 +428,7 @@ bool Mapper::attempt(std::exception_ptr& error, Fault fault, const char* doing, 
   }
 }
 
-/// Calls the host, without a lock that another thread needs.
+/// Calls the host without a lock that another thread needs.
 template <typename Call>
 void Mapper::callBack(std::exception_ptr& error, const char* name, const Call& call) {
   if (stopped_) return;
@@ -449,13 +449,13 @@ void Mapper::callBack(std::exception_ptr& error, const char* name, const Call& c
   if (is_outer) delivering_.erase(thread);
 }
 
-/// A line in the host's log.
+/// Writes a line to the host's log.
 void Mapper::warn(const std::string& text, std::exception_ptr& error) {
   if (!callbacks_.warn) return;
   callBack(error, "the callback of the log", [&] { callbacks_.warn(text); });
 }
 
-/// Within a handler. Throws nothing, even without memory: the thread has nobody to catch it.
+/// Counts an exception, within its handler. Throws nothing: nobody catches in the thread.
 void Mapper::noteError(const char* doing, Fault fault) noexcept {
   const bool is_input = fault == Fault::kEvents || fault == Fault::kPose;
   {
@@ -471,7 +471,7 @@ void Mapper::noteError(const char* doing, Fault fault) noexcept {
       is_new = live_.last_error != text;
       live_.last_error = text;
     }
-    // A callback is named once, rejected events at most once a second, rejected poses never.
+    // A failing callback is logged once, rejected events once a second, rejected poses never.
     const Clock::time_point now = Clock::now();
     if (fault == Fault::kCallback) is_new = logged_callbacks_.insert(doing).second;
     if (fault == Fault::kEvents && now - rejection_logged_ < std::chrono::seconds(1)) return;
@@ -479,11 +479,11 @@ void Mapper::noteError(const char* doing, Fault fault) noexcept {
     if (is_input) rejection_logged_ = now;
     std::exception_ptr ignored;
     warn(is_input ? text : std::string(doing) + ": " + text, ignored);
-  } catch (...) {  // no memory: it is counted
+  } catch (...) {  // no memory: the error is counted already
   }
 }
 
-/// At most once a second.
+/// Warns of lost events and dropped windows, at most once a second.
 void Mapper::warnOfLosses() {
   const Clock::time_point now = Clock::now();
   if (now - warned_ < std::chrono::seconds(1)) return;

@@ -27,8 +27,8 @@
 
 namespace efm {
 
-/// The points of a keyframe in its reference view, and the pose of the view. 20 bytes a point.
-/// Transformed to the world, they are the points of the map again, bit for bit.
+/// Points of a keyframe in its reference view, and the pose of the view. 20 bytes per point.
+/// Transformed to the world, they are again the points of the map, bit for bit.
 struct StoredKeyframe {
   std::int64_t t_ref_ns = 0;
   Rigid3 T_world_ref;
@@ -37,32 +37,32 @@ struct StoredKeyframe {
 
 /// The map at one moment.
 struct MapSnapshot {
-  /// T_world_ref of all keyframes at t_ref; the keyframes of the initial map come first.
+  /// T_world_ref of all keyframes at t_ref. The keyframes of the initial map come first.
   std::vector<StampedPose> trajectory;
-  /// The same poses by the tracker. They differ for refined keyframes.
+  /// The poses of the same keyframes by the tracker. They differ if keyframes are refined.
   std::vector<StampedPose> tracker_trajectory;
-  std::vector<StoredKeyframe> keyframes;  ///< In playback all, in live operation the newest.
+  std::vector<StoredKeyframe> keyframes;  ///< All in playback, the newest in live operation.
   MapCloud::ConstPtr points;              ///< The exported points.
 };
 
 /// Turns the samples of a recording or of a sensor into keyframes and one map. Thread-safe.
 ///
-/// In playback the caller's thread maps: `add` returns when the windows that became complete are
+/// In playback the caller's thread maps. `add` returns when all windows that became complete are
 /// mapped, so the same samples give the same map, bit for bit. The caller gets the first error. If
-/// a window cannot be mapped (no memory, a sink that throws), the next call tries it again; if its
+/// a window cannot be mapped (no memory, a sink that throws), the next call tries it again. If its
 /// keyframe cannot be stored, the window is dropped. A query waits while a keyframe is made, but
 /// not while it is delivered. If several threads add samples, keyframes may be delivered at the
 /// same time. Within a callback `add` and `finish` only take the input: the caller of the callback
 /// maps it.
 ///
 /// In live operation (`[live] enabled`) a thread of the mapper maps. `add` never waits, and queries
-/// return the newest published state. When more input waits than the queue may hold, the oldest
+/// return the newest published state. If more input waits than the queue may hold, the oldest
 /// windows are dropped. Errors of the mapping, the refinement and the callbacks are counted and
 /// logged (LiveStatus); the window is dropped and the next one is tried. The snapshot of the map is
 /// renewed after each keyframe, as long as this takes at most a twentieth of the time.
 class Mapper {
  public:
-  /// All run in the thread that maps, and may use the mapper.
+  /// The callbacks run in the thread that maps, and may use the mapper.
   struct Callbacks {
     std::function<void(const KeyframeDepthMap&)> on_keyframe;
     /// Live operation: receives each new snapshot of the map.
@@ -75,7 +75,7 @@ class Mapper {
   /// @throws std::runtime_error if a file that the options name cannot be read.
   explicit Mapper(const EventFusionOptions& options, Callbacks callbacks = {},
                   const std::vector<StoredKeyframe>& earlier = {});
-  /// The same, for callbacks that may drop the last reference to the mapper in live operation.
+  /// Makes a mapper whose callbacks may drop the last reference to it in live operation.
   static std::shared_ptr<Mapper> make(const EventFusionOptions& options, Callbacks callbacks = {},
                                       const std::vector<StoredKeyframe>& earlier = {});
   /// Ends without mapping the rest.
@@ -89,16 +89,16 @@ class Mapper {
   void add(Sample sample);
   /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
   void skip(const EventPacket& packet);
-  /// Ends the input, and maps the rest; in live operation it waits for that. In playback it may be
-  /// called again after an error.
-  /// @throws std::logic_error in live operation within a callback; the error of the rig, if an
+  /// Ends the input, and maps the rest; in live operation it waits for the rest. In playback it may
+  /// be called again after an error.
+  /// @throws std::logic_error in live operation within a callback; the error of the rig if an
   /// option or a camera does not fit.
   void finish();
-  /// Ends without mapping the rest: later input is lost. It waits for the current keyframe, and no
+  /// Ends without mapping the rest. Later input is lost. It waits for the current keyframe, and no
   /// callback begins after that. Within a callback of live operation it does not wait: the mapper's
-  /// thread ends once the callback returns.
+  /// thread ends after the callback returns.
   void stop();
-  /// Returns whether this is the mapper's own thread: a callback of live operation.
+  /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
   bool runsHere() const { return std::this_thread::get_id() == worker_; }
 
   /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
@@ -108,25 +108,25 @@ class Mapper {
   /// processor time of the process.
   void setClock(ProcessorClock clock);
 
-  /// The pose of the rig on the tracked body, from the options.
+  /// Returns the pose of the rig on the tracked body, from the options.
   const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
   SessionStatus status() const;
-  /// The map so far; in live operation the newest snapshot. Never null.
+  /// Returns the map so far; in live operation its newest snapshot. Never null.
   std::shared_ptr<const MapSnapshot> snapshot() { return newest(true); }
   MapCloud::ConstPtr points() { return snapshot()->points; }
-  /// The same. In playback it has no points, because they cost an export of the map.
+  /// Returns the snapshot. In playback it has no points, because they cost an export of the map.
   std::shared_ptr<const MapSnapshot> keyframes() { return newest(false); }
   std::size_t numKeyframes() const;
-  /// The newest keyframe's depth map, empty before the first one, and its planes.
+  /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
 
  private:
-  /// What was thrown: by the mapping, by a host's callback, or for a sample that is rejected.
+  /// Origin of an exception: the mapping, a callback of the host, or a rejected sample.
   enum class Fault { kMapping, kCallback, kEvents, kPose };
   using Batch = InputQueue::Batch;
   using Clock = std::chrono::steady_clock;
 
-  // The worker: a caller in playback, otherwise the thread.
+  // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
   void workHere(Batch batch);
   void run();
   bool runOnce();
@@ -153,33 +153,33 @@ class Mapper {
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;
-  std::atomic<std::thread::id> worker_{};  // of live operation
-  std::mutex join_mutex_;                  // of thread_
+  std::atomic<std::thread::id> worker_{};  // its thread in live operation
+  std::mutex join_mutex_;                  // guards thread_
 
-  // Of the worker and the members below; held while a keyframe is made, and locked before mutex_.
-  // In live operation the mapper's thread alone locks it.
+  // Guards the worker and the members below. It is held while a keyframe is made, and locked before
+  // mutex_. In live operation only the mapper's thread locks it.
   mutable std::mutex session_mutex_;
   MappingSession session_;
   MapSnapshot map_so_far_;  // without points
   std::map<int, std::uint64_t> paused_events_;
-  std::set<std::thread::id> delivering_;  // the threads within a callback in playback
-  std::set<int> silent_cameras_;          // logged
+  std::set<std::thread::id> delivering_;  // threads that are in a callback in playback
+  std::set<int> silent_cameras_;          // cameras without events that were logged
   std::uint64_t logged_choices_ = 0;
   bool finished_ = false;
 
-  // Of the mapper's thread.
+  // Members of the mapper's thread.
   bool map_changed_ = false;
   Clock::time_point map_renewed_;
   Clock::duration map_cost_{};
   Clock::time_point warned_;
   Clock::time_point rejection_logged_;
-  std::set<std::string> logged_callbacks_;  // that threw
+  std::set<std::string> logged_callbacks_;  // callbacks that threw and were logged
   std::uint64_t warned_losses_ = 0;
   std::uint64_t warned_dropped_windows_ = 0;
   std::uint64_t warned_failures_ = 0;
-  std::shared_ptr<Mapper> self_;  // of `make`, until the thread ends: its owner may be gone
+  std::shared_ptr<Mapper> self_;  // set by `make` until the thread ends: the owner may be gone
 
-  mutable std::mutex mutex_;  // of the members below; held for copies alone
+  mutable std::mutex mutex_;  // guards the members below; held for copies only
   std::condition_variable ended_changed_;
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
@@ -191,7 +191,7 @@ class Mapper {
   bool ended_ = false;
   std::exception_ptr end_error_;
 
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last member: it uses the others
 };
 
 /// p_world = T_world_ref * p_ref.

@@ -15,7 +15,7 @@
 namespace efm {
 namespace {
 
-/// What the first look rejects, the mapping rejects, too.
+/// Adds input to the first look. Input that the first look rejects is rejected by the mapping, too.
 template <typename Add>
 void look(Add add) {
   try {
@@ -35,7 +35,7 @@ MappingSession::MappingSession(const EventFusionOptions& options)
       mapper_(mapperOptions(options)),
       cloud_(options.cloud, options.movableKeyframes()) {
   rig_.declare(mapper_);
-  if (!options.live.enabled && options.automatic.any()) {  // a sensor cannot be looked at ahead
+  if (!options.live.enabled && options.automatic.any()) {  // live operation cannot look ahead
     first_look_ = std::make_unique<FirstLook>(options);
   }
   if (options.refinement.enabled) {
@@ -60,7 +60,7 @@ void MappingSession::addEvents(EventPacket packet) {
     status_.refused_events[camera] += events;
     throw;
   }
-  // A rejected packet takes no other one with it.
+  // If a packet is rejected, the others are used all the same.
   std::exception_ptr rejection;
   for (EventPacket& ready : packets) {
     const int ready_camera = ready.camera;
@@ -69,11 +69,11 @@ void MappingSession::addEvents(EventPacket packet) {
     try {
       older_ns = guard_.admit(mapper_, ready);
       feed(std::move(ready));
-    } catch (...) {  // it contradicts its camera, or no memory
+    } catch (...) {  // contradicts its camera, or no memory
       status_.refused_events[ready_camera] += complete - mapper_.readEvents();
       if (!rejection) rejection = std::current_exception();
       if (older_ns) guard_.noteOlder(ready_camera, *older_ns);
-      if (!rig_.isComplete()) beginClock();  // `next` does it once the rig is complete
+      if (!rig_.isComplete()) beginClock();  // with a complete rig, `next` does this
     }
   }
   if (rejection) std::rethrow_exception(rejection);
@@ -144,7 +144,7 @@ void MappingSession::addPose(const PoseSample& sample) {
   if (refinement_ && used) noises_[source].try_emplace(pose.t_ns, sample.noise);
 }
 
-/// The stated noise of the last pose up to a time. Forgets that of earlier poses.
+/// Returns the stated noise of the last pose up to a time. Forgets the noise of earlier poses.
 std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   if (!pose_source_.selected()) return std::nullopt;
   auto& noises = noises_[*pose_source_.selected()];
@@ -161,7 +161,7 @@ void MappingSession::usePose(const NoisyPose& pose) {
   guard_.notePose(pose.pose);
 }
 
-/// A rejected pose takes no other one with it. In playback the first error is thrown at the end.
+/// Uses poses, also after a rejected pose. In playback, throws the first error at the end.
 void MappingSession::useWaiting(const std::vector<NoisyPose>& poses) {
   std::exception_ptr error;
   for (const NoisyPose& pose : poses) {
@@ -192,41 +192,41 @@ void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
   guard_.noteMissing(camera, missing);
 }
 
-/// Whether the tracker jumped, and all events before the jump are here.
+/// Returns whether the tracker jumped and all events before the jump have arrived.
 bool MappingSession::segmentEnds() const {
   return guard_.jumped() && (finished_ || mapper_.eventsCompleteNs() >= guard_.beforeJumpNs());
 }
 
-/// Goes on to the poses after a jump, once all windows before it are mapped. Windows that span it
-/// are dropped. @return whether it did.
+/// Continues with the poses after a jump when all windows before it are mapped. Drops windows that
+/// contain the jump. @return true if it continued.
 bool MappingSession::beginSegment() {
   if (!segmentEnds()) return false;
   const std::int64_t begin_ns = guard_.afterJumpNs();
   mapper_.dropWindowsBefore(begin_ns, DropReason::kJump);
   fitIntoSegments(begin_ns);
   useWaiting(guard_.beginSegment());
-  finishMapper();  // `finish` could not do it while poses were held
+  finishMapper();  // impossible in `finish` while poses were held
   return true;
 }
 
-/// Goes on to the clock after a reset, once the complete windows before it are mapped.
-/// @return whether it did.
+/// Continues with the clock after a reset when the complete windows before it are mapped.
+/// @return true if it continued.
 bool MappingSession::beginClock() {
   if (!guard_.clockWentBack()) return false;
   restartMapper();
-  for (const std::function<void()>& add : guard_.beginClock()) {  // may hold others again
+  for (const std::function<void()>& add : guard_.beginClock()) {  // may hold input again
     try {
       add();
-    } catch (...) {  // its events are counted
+    } catch (...) {  // the events are counted
     }
   }
   finishMapper();
   return true;
 }
 
-/// Maps on the new clock from now on, with the map so far.
+/// Maps with the new clock from now on, and keeps the map so far.
 void MappingSession::restartMapper() {
-  FusionMapper fresh(mapperOptions(options_));  // complete before it is used: memory may fail
+  FusionMapper fresh(mapperOptions(options_));  // completed before its use: memory may run out
   for (const RigCamera& rig_camera : mapper_.rig().cameras) fresh.addCamera(rig_camera);
   if (depth_follower_) fresh.setPlanes(depth_follower_->planes());
   mapper_.dropAllWindows(DropReason::kClockReset);
@@ -242,8 +242,8 @@ void MappingSession::restartMapper() {
   look_again_ns_ = kMinTimeNs;
 }
 
-/// The end of the input, but not before the poses after a jump and the data after a reset are in.
-/// Before a jump, all events are here.
+/// Ends the mapper's input, after the poses behind a jump and the data behind a reset are in.
+/// Before that, marks the events as complete if there is a jump.
 void MappingSession::finishMapper() {
   if (!finished_ || guard_.clockWentBack()) return;
   if (!guard_.jumped()) return mapper_.finish();
@@ -269,7 +269,7 @@ void MappingSession::finish() {
   if (error) std::rethrow_exception(error);
 }
 
-/// If no window can be mapped.
+/// Limits the wait of events and poses if no window can be mapped.
 void MappingSession::limitWaits() {
   if (finished_) return;
   const auto needed_ns = guard_.limitWaits(mapper_, pose_source_, status_.events);
@@ -292,8 +292,8 @@ std::optional<Window> MappingSession::nextWindow() {
   return mapper_.nextWindow();
 }
 
-/// Drops the oldest window that could be mapped, if newer events fill another one.
-/// @return whether it did.
+/// Drops the oldest window that could be mapped, if newer events fill another window.
+/// @return true if it dropped a window.
 bool MappingSession::dropOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
@@ -313,13 +313,13 @@ void MappingSession::dropOlderHalf() {
                             ? static_cast<double>(policy.window_events)
                             : rate * policy.window_s;
   const double queue_events = options_.live.queueEvents();
-  const bool too_large =  // by its own rate, not by what waits elsewhere
+  const bool too_large =  // because of its own rate, not of other waiting events
       rig_.isComplete() && !options_.automatic.any() && needed > queue_events &&
       static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
   if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
   mapper_.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
                             too_large ? DropReason::kTooLarge : DropReason::kOverload);
-  constexpr double kNews = 1.2;  // one that is that much larger is reported again
+  constexpr double kNews = 1.2;  // factor after which a larger window is reported again
   if (!too_large || needed < kNews * reported_needed_) return;
   reported_needed_ = needed;
   const std::string why = fmt::format(
@@ -372,8 +372,8 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
   return keyframe;
 }
 
-/// Inserts a keyframe into the cloud, refines it, and moves it and others to their refined poses.
-/// Cloud and refinement number keyframes alike: after an error neither has the keyframe.
+/// Inserts a keyframe into the cloud, refines it, and moves keyframes to their refined poses. Cloud
+/// and refinement number keyframes alike: after an error neither has the keyframe.
 void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& store) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
@@ -397,7 +397,7 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
-  // Nobody sees a motion of a small part of a voxel.
+  // A motion of a small part of a voxel is not visible.
   constexpr double kVoxelFraction = 0.1;
   if (!refinement_) return;
   const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
@@ -408,8 +408,8 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
   }
 }
 
-/// Moves keyframes in the cloud to their refined poses; while a background thread refines, a few at
-/// a time, because the mapping goes on.
+/// Moves keyframes in the cloud to their refined poses. If a background thread refines, only a few
+/// keyframes are moved at a time, because the mapping continues.
 void MappingSession::moveKeyframes(double tolerance_m) {
   constexpr std::size_t kMaxMoves = 16;
   cloud_.move(refinement_->takeMoved());

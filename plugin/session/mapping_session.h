@@ -23,51 +23,51 @@
 namespace efm {
 
 /// Turns packets of events and poses, in the order of a recording, into keyframes and the global
-/// cloud: puts the rig together as its cameras appear, feeds the mapper and inserts its keyframes.
-/// Not thread-safe. Knows nothing of MRPT.
+/// cloud: assembles the rig as its cameras appear, feeds the mapper and inserts its keyframes. Not
+/// thread-safe. Knows nothing of MRPT.
 ///
-/// In playback, automatic options are chosen from the whole recording, with the same code as
+/// In playback, automatic options are chosen from the whole recording, with the same code as in
 /// `event-fusion map`, which reads the recording twice. Nothing is mapped before `finish`, and all
 /// events are kept in memory. If they need more than `[live] max_queue_mb`, the recording is a
 /// stream: the options are chosen from the data so far, and then the depth limits follow the
 /// keyframes.
 ///
-/// Use: add data, and after each call `next` until it returns nothing; at the end `finish`, and
-/// `next` again.
+/// Use: add data, and after each call `next` until it returns std::nullopt. At the end call
+/// `finish`, and `next` again.
 class MappingSession {
  public:
   explicit MappingSession(const EventFusionOptions& options);
 
-  /// Nothing is mapped before the rig is complete: see RigAssembly::isReady. In live operation it
-  /// is complete before its events fill half of the queue.
-  /// @throws std::invalid_argument where the packet contradicts its sensor or earlier packets;
-  /// where its camera first appears in a complete rig, or waits for one of a lower index for more
-  /// than a second of events; where the options name a camera that the rig does not have.
+  /// Adds a packet. Nothing is mapped before the rig is complete: see RigAssembly::isReady. In live
+  /// operation it is complete before its events fill half of the queue.
+  /// @throws std::invalid_argument if the packet contradicts its sensor or earlier packets; if its
+  /// camera first appears in a complete rig, or waits for a camera of a lower index for more than a
+  /// second of events; if the options name a camera that the rig does not have.
   void addEvents(EventPacket packet);
-  /// Poses of one source are used: see PoseSourceSelector. The session waits for a better source
-  /// until the rig is complete.
+  /// Adds a pose. Poses of one source are used: see PoseSourceSelector. The session waits for a
+  /// better source until the rig is complete.
   void addPose(const PoseSample& sample);
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
-  /// No more data will come.
-  /// @throws std::invalid_argument where a camera's events came, but none of one of a lower index.
+  /// Ends the input.
+  /// @throws std::invalid_argument if a camera has events, but a camera of a lower index has none.
   /// The other cameras are mapped all the same.
   void finish();
 
-  /// Receives a keyframe at its pose by the tracker, and its points in the cloud: those of its
-  /// fused map, or by option of its cameras' maps.
+  /// Receives a keyframe at its pose by the tracker, and its points in the cloud: the points of its
+  /// fused map or, by option, of its cameras' maps.
   using KeyframeStore = std::function<void(const KeyframeDepthMap&, const std::vector<ViewPoint>&)>;
-  /// Maps the next window that is covered, if there is one, and inserts it into the cloud. If an
-  /// option says so, the pose is refined, and the earlier keyframes that the refinement changes are
-  /// moved. Data in the order of time may be added in between: they change no window that is
-  /// covered. After an exception the earlier keyframes are unchanged. If the refinement fails, the
-  /// keyframe keeps the tracker's motion; without a background thread, the call that finds no
-  /// further window throws that error.
+  /// Maps the next complete window, if there is one, and inserts it into the cloud. By option, the
+  /// pose is refined, and the earlier keyframes that the refinement changes are moved. Data in the
+  /// order of time may be added between calls: they change no complete window. After an exception
+  /// the earlier keyframes are unchanged. If the refinement fails, the keyframe keeps the tracker's
+  /// motion. Without a background thread, the call that finds no further window throws the error of
+  /// the refinement.
   /// @param sink receives every fused plane; may be null.
-  /// @param clock the processor time of the threads that map.
-  /// @param store called before the keyframe is inserted. If it throws, the keyframe is not
-  /// inserted. If this function throws after it, the keyframe is not inserted either.
-  /// @return the keyframe with its refined pose, as known now.
+  /// @param clock processor time of the threads that map.
+  /// @param store called before the keyframe is inserted. If it throws, or this function throws
+  /// after it, the keyframe is not inserted.
+  /// @return the keyframe with its refined pose so far; std::nullopt if no window is complete.
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr,
                                        const ProcessorClock& clock = processSeconds,
                                        const KeyframeStore& store = {});
@@ -76,14 +76,14 @@ class MappingSession {
   /// windows that need the missing events are dropped. If automatic options are not chosen yet,
   /// they are chosen from the data so far, in live operation if these last at least 0.2 s.
   void noteMissing(int camera, const MissingEvents& missing);
-  /// Drops the oldest windows until at most so many events are held, as long as newer events fill
-  /// another window. If no window can be mapped, it is too large or waits for poses: then the
+  /// Drops the oldest windows until at most this number of events is held, as long as newer events
+  /// fill another window. If no window can be mapped, it is too large or waits for poses: then the
   /// windows of the older half of the events are dropped. If a window is larger than the queue of
-  /// live operation, a chosen one is shortened instead.
-  /// @throws std::invalid_argument if a given window is so large: the first time, and if it is much
-  /// larger than when this was last reported.
+  /// live operation and was chosen automatically, it is shortened instead.
+  /// @throws std::invalid_argument if the user chose a window that is too large: the first time,
+  /// and when it is much larger than at the last report.
   void limitHeld(double max_events);
-  /// After `next` has thrown: drops the window that it was mapping.
+  /// Drops the window whose mapping in `next` has thrown.
   /// @return true if a window was dropped; false if the error did not belong to a window.
   bool dropFailedWindow();
 
@@ -91,11 +91,11 @@ class MappingSession {
   void applyPending();
 
   const GlobalCloud& cloud() const { return cloud_.cloud(); }
-  /// The poses of this session's keyframes, in their order: in the cloud, and by the tracker.
+  /// Return the poses of this session's keyframes, in order: in the cloud, and by the tracker.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
   const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }
-  /// The depth planes of the newest keyframe (of the first one if there is none), and how often
-  /// options were chosen.
+  /// Depth planes of the newest keyframe (or for the first one if there is none), and the number of
+  /// times that options were chosen.
   struct Chosen {
     DepthPlanesOptions planes;
     std::uint64_t choices = 0;
@@ -123,11 +123,11 @@ class MappingSession {
   void restartMapper();
   bool pieceEnds() const { return segmentEnds() || guard_.clockWentBack(); }
   bool endPiece() { return beginSegment() || beginClock(); }
-  // What waits beyond the queue.
+  // Functions that limit the held events.
   std::optional<Window> nextWindow();
   bool dropOldestWindow();
   void dropOlderHalf();
-  // In automatic_choice.cpp.
+  // Functions in automatic_choice.cpp.
   bool chooseAutomatic();
   bool chooseFromFirstLook();
   bool chooseFromSoFar(double at_least_s);
@@ -145,38 +145,38 @@ class MappingSession {
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
   void moveKeyframes(double tolerance_m);
 
-  const AutomaticOptions automatic_;  // as they were given
-  EventFusionOptions options_;        // automatic: those that are to be chosen now
+  const AutomaticOptions automatic_;  // as the user gave them
+  EventFusionOptions options_;        // `automatic`: the options that are still to be chosen
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   LiveGuard guard_;
   FusionMapper mapper_;
-  MapperCounts earlier_counts_;            // of mappers before a clock reset
-  std::unique_ptr<FirstLook> first_look_;  // in playback, until options are chosen
+  MapperCounts earlier_counts_;            // counts of the mappers before clock resets
+  std::unique_ptr<FirstLook> first_look_;  // set in playback until options are chosen
   bool first_look_ends_ = false;
-  std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
+  std::optional<DepthFollower> depth_follower_;  // set if depth limits are automatic
   std::optional<DepthPlanesOptions> newest_planes_;
   std::optional<std::int64_t> no_scene_since_ns_;
   std::size_t events_without_scene_ = 0;
-  std::int64_t look_again_ns_ = kMinTimeNs;  // not before
+  std::int64_t look_again_ns_ = kMinTimeNs;  // the next choice is not before this time
   std::int64_t look_interval_ns_ = 0;
   RefinedCloud cloud_;
-  std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
+  std::unique_ptr<MapRefinement> refinement_;  // set if poses are refined
   std::vector<Rigid3> T_odom_ref_;
-  // The stated noise of the poses of each source, by their times.
+  // Stated noise of the poses of each source, by the times of the poses.
   std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
   bool finished_ = false;
-  bool keyframe_lost_ = false;  // the last call of `next` made one and threw
+  bool keyframe_lost_ = false;  // the last call of `next` made a keyframe and threw
   bool all_refined_ = false;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   /// The poses between two jumps.
   struct Segment {
-    std::int64_t begin_ns = kEndOfTimeNs;  // before the first event: not known
-    std::uint64_t keyframes = 0;           // before it
-    int too_short = 0;                     // earlier ones in a row that no window fitted into
+    std::int64_t begin_ns = kEndOfTimeNs;  // kEndOfTimeNs before the first event
+    std::uint64_t keyframes = 0;           // number of keyframes before the segment
+    int too_short = 0;  // number of consecutive earlier segments without room for a window
   };
   Segment segment_;
-  double reported_needed_ = 0;  // the events of a window that was too large
+  double reported_needed_ = 0;  // events of a reported window that was too large
   SessionStatus status_;        // incomplete: see status()
 };
 

@@ -45,11 +45,11 @@ class MotionChecks {
     return count > 1 ? fmt::format(", {} times, the {}", count, which) : std::string();
   }
 
-  /// The part of a span that has events.
+  /// Returns the part of a span with events.
   PoseSpan withEvents(const PoseSpan& span) const {
     return {std::max(span.t0_ns, events_.t0_ns), std::min(span.t1_ns, events_.t1_ns)};
   }
-  /// Of all cameras, per second.
+  /// Returns the event rate of all cameras, per second.
   double eventRate(const PoseSpan& span) const {
     const PoseSpan part = withEvents(span);
     if (part.t1_ns <= part.t0_ns) return 0;
@@ -60,7 +60,7 @@ class MotionChecks {
     return count / secondsBetween(part.t0_ns, part.t1_ns);
   }
 
-  /// The rate of events without the rests that the poses say.
+  /// Returns the event rate without the rests of the poses.
   double movingRate() const {
     double moving_s = secondsBetween(events_.t0_ns, events_.t1_ns);
     double count = eventRate(events_) * moving_s;
@@ -74,14 +74,14 @@ class MotionChecks {
     return moving_s > 0 ? count / moving_s : 0;
   }
 
-  /// Whether the events say that the rig moves on while its poses repeat.
+  /// Returns whether the events show motion of the rig while its poses repeat.
   bool isFrozen(const PoseHold& hold) const {
     constexpr double kMinHoldS = 0.02;
-    // A depth plane is about a pixel from the next one.
+    // Depth planes are about a pixel apart.
     constexpr double kMinPixels = 3;
-    // A rig that comes to rest is slow before, and then has the events of noise alone.
-    constexpr double kMinSpeed = 0.25;  // of the mean one
-    constexpr double kMinRate = 0.5;    // of the events beside it, or of the mean
+    // Before a rest, a rig is slow. During a rest, it has only noise events.
+    constexpr double kMinSpeed = 0.25;  // fraction of the mean speed
+    constexpr double kMinRate = 0.5;    // fraction of the rate beside the hold, or of the mean rate
     constexpr std::int64_t kBesideNs = 200'000'000;
     if (!matters(hold)) return false;
     const PoseSpan part = withEvents(hold);
@@ -117,9 +117,9 @@ class MotionChecks {
   }
 
   void checkGaps() {
-    // Visible motion, of which interpolation misses half of a plane's distance to the next.
-    // Measured on hand-held and helmet trajectories of which poses were left out: the estimate is
-    // within 40 % of what interpolation really missed, 1 to 2 pixels at 0.1 s, 2 to 7 at 0.2 s.
+    // The motion is visible, and interpolation misses half of the distance of two planes. Measured
+    // on hand-held and helmet trajectories with left-out poses: the estimate is within 40 % of the
+    // true miss, 1 to 2 pixels at 0.1 s, 2 to 7 at 0.2 s.
     constexpr double kMinMoved = 3;
     constexpr double kMinMissed = 0.5;
     int count = 0;
@@ -141,11 +141,11 @@ class MotionChecks {
                pixels(worst.moved), pixels(worst.missed));
   }
 
-  /// The deviation of most steps, and of all that are no jumps by far: nothing where there are too
-  /// few.
+  /// Returns the deviation that most steps stay below, without possible jumps; std::nullopt if
+  /// there are too few steps.
   std::optional<double> usualDeviation(PoseStep PoseMotion::Bin::*kind) const {
     constexpr std::size_t kMinBins = 10;
-    constexpr std::size_t kMaxJumps = 3;  // do not count
+    constexpr std::size_t kMaxJumps = 3;  // largest steps that are left out
     constexpr double kMost = 0.9;
     std::vector<double> deviations;
     for (const PoseMotion::Bin& bin : motion_.bins()) {
@@ -157,19 +157,19 @@ class MotionChecks {
     return deviations[static_cast<std::size_t>(kMost * static_cast<double>(deviations.size()))];
   }
 
-  /// The largest jumps in translation or rotation.
+  /// Jumps in translation or rotation.
   struct Jumps {
     int count = 0;
     PoseStep largest;
-    double usual = 0;   // deviation, m/s or rad/s
-    double pixels = 0;  // of the largest one
+    double usual = 0;   // usual deviation, m/s or rad/s
+    double pixels = 0;  // of the largest jump
   };
 
   static double sizeOf(const PoseStep& step) {
     return step.deviation * secondsBetween(step.t0_ns, step.t1_ns);
   }
 
-  /// @param weight of the deviation in the unit image plane.
+  /// @param weight factor from the deviation to the unit image plane.
   Jumps jumpsOf(PoseStep PoseMotion::Bin::*kind, double weight) const {
     // Four measured trajectories have steps of up to 8 times the usual deviation.
     constexpr double kMinRatio = 12;
@@ -210,10 +210,10 @@ class MotionChecks {
   }
 
   const RecordingStatistics& recording_;
-  double depth_m_;  // at which motion is seen: a middle one of the scene
+  double depth_m_;  // middle depth of the scene, for the motion in pixels
   double max_gap_s_;
   double focal_px_ = 0;
-  PoseSpan events_;  // their time
+  PoseSpan events_;  // time of the events
   PoseMotion motion_;
   std::vector<Warning>& warnings_;
 };

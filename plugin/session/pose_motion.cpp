@@ -10,14 +10,14 @@
 namespace efm {
 namespace {
 
-/// Speeds at a step are those of poses within this time: shorter than most accelerations, longer
-/// than the jitter of a tracker.
+/// Time of the poses that give the speed at a step: shorter than most accelerations, longer than
+/// the jitter of a tracker.
 constexpr std::int64_t kReachNs = 50'000'000;
-/// Speeds before and after poses that repeat.
+/// Time of the poses that give the speed before and after repeated poses.
 constexpr std::int64_t kHoldReachNs = 200'000'000;
-/// A step waits for this many poses after it, and for `kHoldReachNs`.
+/// Number of poses after a step before it is evaluated, beside the time `kHoldReachNs`.
 constexpr std::size_t kStepsAround = 2;
-/// LiDAR odometry has a pose per turn, 0.1 s and a little jitter: nobody would mend that.
+/// LiDAR odometry has a pose per turn, 0.1 s with a little jitter: a normal gap.
 constexpr std::int64_t kMinGapNs = 105'000'000;
 constexpr std::size_t kMaxBins = 1024;
 
@@ -31,7 +31,7 @@ struct Velocity {
 Velocity velocityOf(const StampedPose& from, const StampedPose& to) {
   const double dt_s = secondsBetween(from.t_ns, to.t_ns);
   Eigen::Quaterniond turn = from.T_world_rig.rotation.conjugate() * to.T_world_rig.rotation;
-  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();  // the shorter way
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();  // the shorter rotation
   const double sine = turn.vec().norm();
   const double angle = 2 * std::atan2(sine, turn.w());
   const Eigen::Vector3d rotation =
@@ -47,7 +47,7 @@ Velocity meanOf(const Velocity& a, const Velocity& b) {
   return {(a.linear + b.linear) / 2, (a.angular + b.angular) / 2};
 }
 
-/// The velocity of the poses before one, over a time and a number of steps at least, if there are.
+/// Returns the velocity before a pose, over a number of steps and, if there are more poses, a time.
 std::optional<Velocity> velocityBefore(const Poses& poses, std::size_t last, std::int64_t reach_ns,
                                        std::size_t steps) {
   if (last < steps) return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<Velocity> velocityBefore(const Poses& poses, std::size_t last, std
   return velocityOf(poses[first], poses[last]);
 }
 
-/// The velocity of the poses after one.
+/// Returns the velocity after a pose.
 std::optional<Velocity> velocityAfter(const Poses& poses, std::size_t first, std::int64_t reach_ns,
                                       std::size_t steps) {
   std::size_t last = first + steps;
@@ -113,7 +113,7 @@ MotionAmount PoseMotion::meanSpeed() const {
   return moving_s_ > 0 ? path_ * (1 / moving_s_) : MotionAmount();
 }
 
-/// @param step from this one of poses_ to the next one.
+/// @param step from this pose of poses_ to the next one.
 void PoseMotion::look(std::size_t step) {
   lookAtHold(step);
   const StampedPose& from = poses_[step];
@@ -127,8 +127,8 @@ void PoseMotion::look(std::size_t step) {
   const auto before = velocityBefore(poses_, step, kReachNs, kStepsAround);
   const auto after = velocityAfter(poses_, step + 1, kReachNs, kStepsAround);
   if (!before || !after) return;
-  // The least of three: a jump deviates from all of them, its neighbours only where it lies within
-  // their `before` or `after`.
+  // The smallest of three deviations. A jump deviates from all three velocities; its neighbours
+  // only if the jump is within their `before` or `after`.
   MotionAmount deviation = differenceOf(velocity, meanOf(*before, *after));
   for (const Velocity& beside : {*before, *after}) {
     const MotionAmount other = differenceOf(velocity, beside);
@@ -160,7 +160,7 @@ void PoseMotion::lookAtGap(std::size_t step) {
   merge(binAt(from.t_ns), found);
 }
 
-/// A hold begins or ends with the step, or goes on.
+/// Begins, continues or ends a hold at the step.
 void PoseMotion::lookAtHold(std::size_t step) {
   const StampedPose& from = poses_[step];
   const bool repeats =
@@ -178,7 +178,7 @@ void PoseMotion::lookAtHold(std::size_t step) {
   hold_.reset();
   found.hold.t1_ns = from.t_ns;
   if (isRest(found.hold)) moving_s_ -= durationOf(found.hold);
-  // Without the step that ends the hold: it may be a jump.
+  // The step that ends the hold is left out: it may be a jump.
   if (const auto after = velocityAfter(poses_, step + 1, kHoldReachNs, 1)) {
     found.hold.speed_after = speedOf(*after).sum() > found.hold.speed.sum();
     if (found.hold.speed_after) found.hold.speed = speedOf(*after);

@@ -36,7 +36,7 @@ std::vector<StampedPose> PoseSourceSelector::select() {
 }
 
 void PoseSourceSelector::limitWaiting(std::int64_t max_age_ns) {
-  // One with a wrong time must not keep those behind it.
+  // A pose with a wrong time must not keep the poses after it.
   while (!waiting_.empty() && std::abs(waiting_.back().pose.t_ns / 2 -
                                        waiting_.front().pose.t_ns / 2) > max_age_ns / 2) {
     waiting_.pop_front();
@@ -47,7 +47,7 @@ std::optional<std::int64_t> PoseSourceSelector::waitingNs() const {
   return waiting_.empty() ? std::nullopt : std::optional(waiting_.back().pose.t_ns);
 }
 
-/// Returns the waiting poses of a source and counts the others.
+/// Returns the waiting poses of a source and counts the other poses.
 std::vector<StampedPose> PoseSourceSelector::select(const PoseSourceId& source) {
   selected_ = source;
   std::vector<StampedPose> poses;

@@ -14,14 +14,14 @@
 
 namespace efm {
 
-/// The kinds of pose sources, the best first.
+/// Kinds of pose sources, the best first.
 enum class PoseKind {
   kPose,      ///< Poses in the world.
-  kOdometry,  ///< Wheels, in the plane: drifts.
-  kActions,   ///< Movements, composed: drifts.
+  kOdometry,  ///< Wheel odometry in the plane; it drifts.
+  kActions,   ///< Composed movements; they drift.
 };
 
-/// A source of poses: its kind, and the label of its sensor.
+/// Source of poses: its kind, and the label of its sensor.
 struct PoseSourceId {
   PoseKind kind = PoseKind::kPose;
   std::string label;
@@ -34,31 +34,31 @@ struct PoseSourceId {
   }
 };
 
-/// "odometry 'wheels'", for messages.
+/// Returns "odometry 'wheels'", for messages.
 std::string asText(const PoseSourceId& source);
 
-/// Selects the poses of one source and counts those of others. The poses of two sources are never
-/// mixed: they have two worlds, or one of them is worse.
+/// Selects the poses of one source and counts the poses of other sources. The poses of two sources
+/// are never mixed: they refer to different worlds, or one source is worse.
 ///
-/// The best kind wins, and of two sources of a kind the first one. A pose of the best kind selects
-/// its source at once. Poses of other kinds wait until `select`, because a better source may still
-/// come.
+/// The source of the best kind is used; of two sources of a kind, the first one. A pose of the best
+/// kind selects its source at once. Poses of other kinds wait until `select`, because a better
+/// source may still come.
 class PoseSourceSelector {
  public:
   /// @param label the source's label; empty: the best source.
   explicit PoseSourceSelector(std::string label) : label_(std::move(label)) {}
 
-  /// @return the poses to use from now on, in the order they came.
+  /// @return the poses to use from now on, in the order of arrival.
   std::vector<StampedPose> add(const PoseSourceId& source, const StampedPose& pose);
-  /// Selects the best source so far and waits no longer. @return as `add`.
+  /// Selects the best source so far and does not wait any longer. @return as `add`.
   std::vector<StampedPose> select();
-  /// Forgets waiting poses that are this much older than the last one.
+  /// Forgets waiting poses that are older than the last one by more than this.
   void limitWaiting(std::int64_t max_age_ns);
-  /// The time of the last waiting pose.
+  /// Returns the time of the last waiting pose; std::nullopt if none waits.
   std::optional<std::int64_t> waitingNs() const;
 
   const std::optional<PoseSourceId>& selected() const { return selected_; }
-  /// The number of poses of other sources.
+  /// Returns the number of unused poses of each other source.
   const std::map<PoseSourceId, std::uint64_t>& unused() const { return unused_; }
 
  private:
@@ -71,7 +71,7 @@ class PoseSourceSelector {
 
   std::string label_;
   std::optional<PoseSourceId> selected_;
-  bool waits_ = true;  // for a better source
+  bool waits_ = true;  // true while a better source may come
   std::deque<WaitingPose> waiting_;
   std::map<PoseSourceId, std::uint64_t> unused_;
 };

@@ -116,7 +116,7 @@ double StreamStatistics::rate() const {
 }
 
 void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
-  // Over a shorter step, the noise of a tracker with a high rate looks like speed.
+  // In shorter steps, the noise of a tracker with a high rate looks like speed.
   constexpr std::int64_t kMinStepNs = 10'000'000;
   const bool late = poses.last_ns && pose.t_ns <= *poses.last_ns;
   poses.add(pose.t_ns, pose.t_ns, 1);
@@ -163,7 +163,7 @@ void RecordingStatistics::addEvents(const EventPacket& packet) {
     if (offset < options_.time_offsets_ns.size()) {
       statistics.camera.time_offset_ns = options_.time_offsets_ns[offset];
     }
-    // Without a calibration a sensor may have the largest size there is.
+    // A sensor without a calibration may have the largest possible size.
     constexpr std::size_t kMaxPixels = 1U << 24U;
     const std::size_t pixels = width * static_cast<std::size_t>(camera.model.height);
     if (pixels <= kMaxPixels) statistics.pixels.assign(pixels, 0);
@@ -199,8 +199,8 @@ void RecordingStatistics::addPose(const PoseSample& pose) {
   countAroundPose(t_ns);
 }
 
-/// The recording is in the order of time: a new pose can lie only within the last packet of each
-/// camera.
+/// A new pose can be only within the last packet of each camera, because the recording is in the
+/// order of time.
 void RecordingStatistics::countAroundPose(std::int64_t t_ns) {
   const bool first = poses_.count == 0;
   poses_.add(t_ns, t_ns, 1);

@@ -20,11 +20,11 @@
 
 namespace efm {
 
-/// The rate of events over a recording of any length, in constant memory: a fixed number of bins.
-/// Where time goes beyond the last bin, neighbouring bins are joined and all become twice as wide.
+/// Event rate over a recording of any length, in constant memory: a fixed number of bins. If time
+/// exceeds the last bin, neighbouring bins are joined and all become twice as wide.
 class EventRate {
  public:
-  /// Adds an event. One before the first event counts for the first bin.
+  /// Adds an event. An event with a time before the first event counts for the first bin.
   void add(std::int64_t t_ns) {
     if (!start_ns_) start_ns_ = t_ns;
     std::int64_t bin = t_ns < *start_ns_ ? 0 : (t_ns - *start_ns_) >> log2_width_;
@@ -32,10 +32,10 @@ class EventRate {
     ++counts_[static_cast<std::size_t>(bin)];
   }
 
-  /// Events per second in intervals of equal length that divide [t0, t1]. An event counts for the
+  /// Returns the events per second in equal intervals that divide [t0, t1]. An event counts for all
   /// intervals that its bin overlaps: a bin is at most 1/4096 of the time from the first event on.
   std::vector<double> over(std::int64_t t0_ns, std::int64_t t1_ns, int intervals) const;
-  /// The number of events in [t0, t1): of each bin, in proportion to its overlap.
+  /// Returns the number of events in [t0, t1). Each bin counts in proportion to its overlap.
   double countIn(std::int64_t t0_ns, std::int64_t t1_ns) const;
 
  private:
@@ -48,24 +48,24 @@ class EventRate {
   std::array<std::uint64_t, kBins> counts_{};
 };
 
-/// The fraction of the events' time that poses cover, 0 to 1.
+/// Returns the fraction of the events' time with poses, 0 to 1.
 double overlapOf(const TimeSpan& events, const TimeSpan& poses);
 
-/// A line of block characters (UTF-8), one per value: of eight heights up to the largest value; a
-/// blank for 0.
+/// Returns a line of block characters (UTF-8), one per value: eight heights up to the largest
+/// value, and a blank for 0.
 std::string sparkline(const std::vector<double>& values);
 
-/// How a recording is understood. The default: as recorded.
+/// Options for the use of a recording. The default: as recorded.
 struct StatisticsOptions {
-  std::vector<int> cameras;                   ///< Those that take part; empty: all.
+  std::vector<int> cameras;                   ///< The cameras that take part; empty: all.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera, instead of the recording's.
-  std::optional<Rigid3> T_body_rig;           ///< Instead of the recording's.
-  std::string pose_source;                    ///< The label of the source; empty: the best one.
-  /// The motion that counts is that within this time.
+  std::optional<Rigid3> T_body_rig;           ///< Used instead of the recording's, if set.
+  std::string pose_source;                    ///< Label of the source; empty: the best source.
+  /// Motion is measured within windows of this length.
   double window_s = 1.0;
 };
 
-/// The options of a map, as far as they are known before it.
+/// Returns the options for the recording of a map that are known before the mapping.
 StatisticsOptions statisticsOptions(const EventFusionOptions& options);
 
 /// Times of events or poses, in the order of the recording, on the trajectory's clock.
@@ -73,36 +73,36 @@ struct StreamStatistics {
   std::uint64_t count = 0;
   std::optional<std::int64_t> first_ns;
   std::optional<std::int64_t> last_ns;
-  std::int64_t max_gap_ns = 0;  ///< Between two additions.
+  std::int64_t max_gap_ns = 0;  ///< Largest gap between two additions.
   std::int64_t max_gap_start_ns = 0;
 
   /// Adds a number of times in the closed interval [from, until].
   void add(std::int64_t from_ns, std::int64_t until_ns, std::uint64_t number);
   double seconds() const;
-  double rate() const;  ///< Per second; 0 where the stream has no duration.
+  double rate() const;  ///< Per second; 0 if the stream has no duration.
 };
 
-/// The events of one camera.
+/// Statistics of the events of one camera.
 struct CameraStatistics {
   RigCamera camera;
   StreamStatistics events;
   std::uint64_t positive = 0;  ///< Events of positive polarity.
   EventRate rate;
-  /// Events per pixel, row-major; empty where the sensor is too large to count them.
+  /// Events per pixel, row-major; empty if the sensor is too large to count them.
   std::vector<std::uint32_t> pixels;
 
-  std::vector<std::int64_t> newest_ns;  ///< Times of the last packet.
+  std::vector<std::int64_t> newest_ns;  ///< Times of the events in the last packet.
 };
 
-/// The poses of one source.
+/// Statistics of the poses of one source.
 struct PoseStatistics {
   StreamStatistics poses;
-  std::size_t order = 0;  ///< Among the sources, by their first poses.
+  std::size_t order = 0;  ///< Rank among the sources, by the first poses.
   double path_m = 0;
   double max_speed = 0;          ///< m/s, over at least 10 ms.
   double max_rotation_rate = 0;  ///< rad/s, over at least 10 ms.
-  double max_shift_m = 0;        ///< The largest distance from the first pose of a window.
-  double max_rotation_rad = 0;   ///< The largest rotation from the first pose of a window.
+  double max_shift_m = 0;        ///< Largest distance from the first pose of a window.
+  double max_rotation_rad = 0;   ///< Largest rotation from the first pose of a window.
   PoseMotion motion;
 
   void add(const StampedPose& pose, std::int64_t window_ns);
@@ -112,32 +112,32 @@ struct PoseStatistics {
   std::optional<StampedPose> window_begin_;
 };
 
-/// Sees each observation of a recording once and counts what can be judged: see `healthWarnings`.
-/// Memory does not grow with the recording. Not thread-safe.
+/// Collects statistics of a recording from each of its samples, for `warningsOf`. Memory does not
+/// grow with the recording. Not thread-safe.
 class RecordingStatistics {
  public:
-  /// By the index of the camera and its label.
+  /// Cameras by index and label.
   using Cameras = std::map<std::pair<int, std::string>, CameraStatistics>;
 
   explicit RecordingStatistics(StatisticsOptions options = {}) : options_(std::move(options)) {}
 
-  /// The motion that counts is that within this time. To be called before the first pose.
+  /// Sets the length of the windows in which motion is measured. Call it before the first pose.
   void setWindow(double window_s) { options_.window_s = window_s; }
-  /// @return false for a sample that is neither events nor a pose.
+  /// @return false if the sample is neither events nor a pose.
   bool add(const Sample& sample);
-  /// @param packet with its events in time order.
+  /// @param packet must have its events in time order.
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
-  /// The calibrations that a map used instead of the recorded ones.
+  /// Sets the calibrations that a map used instead of the recorded ones.
   void setCameras(const std::vector<RigCamera>& cameras);
 
   const Cameras& cameras() const { return cameras_; }
   const std::map<PoseSourceId, PoseStatistics>& poseSources() const { return pose_sources_; }
-  /// The source whose poses are used: see PoseSourceSelector. Null where there is none.
+  /// Returns the source whose poses are used (see PoseSourceSelector); null if there is none.
   const PoseStatistics* usedPoses() const;
-  /// First and last event of all cameras.
+  /// Returns the times of the first and the last event of all cameras.
   std::optional<TimeSpan> eventSpan() const;
-  /// Events earlier than the first pose, and later than the last, of all sources.
+  /// Return the number of events before the first pose, and after the last pose, of all sources.
   std::uint64_t eventsBeforePoses() const { return events_before_poses_; }
   std::uint64_t eventsAfterPoses() const { return events_after_poses_; }
 
@@ -147,7 +147,7 @@ class RecordingStatistics {
   StatisticsOptions options_;
   Cameras cameras_;
   std::map<PoseSourceId, PoseStatistics> pose_sources_;
-  StreamStatistics poses_;  // of all sources
+  StreamStatistics poses_;  // poses of all sources
   std::uint64_t events_before_poses_ = 0;
   std::uint64_t events_after_poses_ = 0;
 };

@@ -16,7 +16,7 @@
 namespace efm {
 namespace {
 
-/// Equal but for the rounding of MRPT's poses.
+/// Returns whether poses are equal, except for the rounding of MRPT's poses.
 bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
   constexpr double kRounding = 1e-9;
   const Rigid3 T_b_c = T_a_b.inverse() * T_a_c;
@@ -75,7 +75,7 @@ std::vector<EventPacket> RigAssembly::add(EventPacket packet, FusionMapper& mapp
   }
   ready.push_back(std::move(packet));
   if (!is_new) return ready;
-  // Cameras come before any of their packets: a packet may complete the rig.
+  // All cameras are added before their packets, because a packet may complete the rig.
   for (auto next = waiting_.extract(num_cameras_); next; next = waiting_.extract(num_cameras_)) {
     addCamera(next.mapped().front().calibration, mapper);
     std::move(next.mapped().begin(), next.mapped().end(), std::back_inserter(ready));
@@ -125,7 +125,7 @@ bool RigAssembly::isReady(std::int64_t begin_ns, bool has_poses) {
   return (has_poses && isKnown()) || *newest_begin_ns_ - *first_ns_ > kCompletesNs;
 }
 
-/// Whether no further camera can come.
+/// Returns whether all cameras are known.
 bool RigAssembly::isKnown() const {
   const auto count = static_cast<std::size_t>(num_cameras_);
   if (!waiting_.empty() || count == 0) return false;
@@ -153,7 +153,7 @@ void RigAssembly::letWait(EventPacket packet) {
     if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
     if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
   } else if (waiting != waiting_.end()) {
-    return;  // the first one has the calibration
+    return;  // the first packet has the calibration
   }
   waiting_[camera].push_back(std::move(packet));
 }

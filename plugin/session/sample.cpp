@@ -22,7 +22,7 @@ std::int64_t nearestTick(std::int64_t t_ns) {
 }
 
 Rigid3 roundedPose(const Rigid3& T_a_b) {
-  // Each operation in MRPT's order: the last bit counts.
+  // The operations have MRPT's order, so that the last bit is equal.
   const Eigen::Quaterniond unit = T_a_b.rotation.normalized();
   const double sign = unit.w() < 0 ? -1 : 1;
   double r = sign * unit.w(), x = sign * unit.x(), y = sign * unit.y(), z = sign * unit.z();

@@ -22,19 +22,19 @@
 
 namespace efm {
 
-/// Seconds of a run, by stage: of real time, or of processor time.
+/// Seconds of a run, by stage: real time or processor time.
 struct StageSeconds {
   double total = 0;   ///< The whole run.
   double read = 0;    ///< Reading the recording.
   double sweep = 0;   ///< Packets, back-projection, votes and fusion.
   double depth = 0;   ///< Extraction of depth maps.
   double refine = 0;  ///< Refinement of poses.
-  double map = 0;     ///< Insertion into the global cloud; of real time also its export.
+  double map = 0;     ///< Insertion into the global cloud; in real time also its export.
   double filter = 0;  ///< Checks, buffering and noise filters of events.
   double images = 0;  ///< Images of keyframes.
-  double start = 0;   ///< Before the command: the program and its libraries are loaded.
-  double tables = 0;  ///< The rig and the undistortion tables of its cameras.
-  double output = 0;  ///< Processor time alone: export of the map, and its files.
+  double start = 0;   ///< Loading of the program and its libraries, before the command.
+  double tables = 0;  ///< Set-up of the rig and the undistortion tables of its cameras.
+  double output = 0;  ///< Export of the map and its files; in processor time only.
 };
 
 /// Real and processor time of the same stages.
@@ -43,7 +43,7 @@ struct StageTimes {
   StageSeconds cpu;
 };
 
-/// Reads a clock of processor time, in seconds.
+/// Function that returns a processor time, in seconds.
 using ProcessorClock = std::function<double()>;
 
 inline double secondsOf(clockid_t clock) {
@@ -51,7 +51,7 @@ inline double secondsOf(clockid_t clock) {
   clock_gettime(clock, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
-/// Processor time of all threads of this process, or of this thread.
+/// Return the processor time of all threads of this process, and of this thread.
 inline double processSeconds() { return secondsOf(CLOCK_PROCESS_CPUTIME_ID); }
 inline double threadSeconds() { return secondsOf(CLOCK_THREAD_CPUTIME_ID); }
 
@@ -59,7 +59,7 @@ inline double threadSeconds() { return secondsOf(CLOCK_THREAD_CPUTIME_ID); }
 /// processor clock.
 class SecondsScope {
  public:
-  /// @param clock by default this thread's.
+  /// @param clock default: the processor time of this thread.
   SecondsScope(double& real_s, double& cpu_s, ProcessorClock clock = threadSeconds)
       : real_s_(real_s), cpu_s_(cpu_s), clock_(std::move(clock)), cpu_begin_s_(clock_()) {}
   ~SecondsScope() {
@@ -80,7 +80,7 @@ class SecondsScope {
 /// Measures the stages of the mapping, which do not overlap.
 class StageTimer : public StageHook {
  public:
-  /// @param clock of all threads of the mapping.
+  /// @param clock processor time of all threads of the mapping.
   StageTimer(StageTimes& times, const ProcessorClock& clock) : times_(times), clock_(clock) {}
 
   void begin(Stage stage) override {
@@ -97,19 +97,19 @@ class StageTimer : public StageHook {
   std::optional<SecondsScope> scope_;
 };
 
-/// A time for the user, exact, and its distance from the recording's start:
-/// "1468939802.345678901 s (+3.2 s)". The distance is rounded to milliseconds.
-/// @param start_ns the recording's first event; nothing: the time alone.
+/// Returns a time for the user, exact, and its distance from the recording's start, rounded to
+/// milliseconds: "1468939802.345678901 s (+3.2 s)".
+/// @param start_ns the recording's first event; std::nullopt: the text has the time only.
 std::string timeText(std::int64_t t_ns, std::optional<std::int64_t> start_ns);
 
-/// The same of an interval: "10.100000000 to 10.300000000 s (+0.1 to +0.3 s)".
+/// Returns the text of an interval: "10.100000000 to 10.300000000 s (+0.1 to +0.3 s)".
 std::string timeText(std::int64_t first_ns, std::int64_t last_ns,
                      std::optional<std::int64_t> start_ns);
 
-/// Time limits as options: "from --t0 2.000000000 s until --t1 3.000000000 s".
+/// Returns time limits as options: "from --t0 2.000000000 s until --t1 3.000000000 s".
 std::string limitsText(const TimeLimits& limits);
 
-/// A duration: "42 s", "3:05 min" or, from an hour on, "01:23 h" (HH:MM).
+/// Returns a duration: "42 s", "3:05 min" or, from an hour on, "01:23 h" (HH:MM).
 std::string durationText(double seconds);
 
 /// First and last time of a stream, on the trajectory's clock.
@@ -125,63 +125,63 @@ inline void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   span->last_ns = std::max(span->last_ns, t_ns);
 }
 
-/// One camera's events before the mapping, in live operation:
-/// received = held + queued + taken + the sum of the fates.
+/// Counts of one camera's events before the mapping, in live operation: received = held + queued +
+/// taken + the sum of the fates.
 struct QueueCounts {
   std::uint64_t received = 0;
-  std::uint64_t held = 0;  ///< Until the end of their 10 ms, or the next event confirms them.
+  std::uint64_t held = 0;  ///< Waiting for the end of their 10 ms, or for a confirming event.
   std::uint64_t queued = 0;
-  std::uint64_t taken = 0;  ///< By the mapping: `EventCounts::read`, or `refused_events`.
-  /// Of `taken`: rejected, or lost by their fate. Not counted for a camera that takes no part.
+  std::uint64_t taken = 0;  ///< Taken by the mapping: `EventCounts::read`, or `refused_events`.
+  /// Part of `taken`: rejected, or lost by fate. Not counted for a camera that takes no part.
   std::uint64_t lost = 0;
-  EventFates fates;  ///< Of the queue.
+  EventFates fates;  ///< Fates in the queue.
 
-  /// The events that are lost in the queue or in the mapping.
+  /// Returns the number of events that are lost in the queue or in the mapping.
   std::uint64_t losses() const { return fates.losses() + lost; }
 };
 
-/// "3 windows given up: 2 for overload, 1 without poses".
+/// Returns "3 windows given up: 2 for overload, 1 without poses".
 std::string asText(const DroppedWindows& windows);
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
-  std::uint64_t pose_jumps = 0;   ///< New stretches of poses.
-  std::uint64_t clock_steps = 0;  ///< The clock went back, and the mapping started anew.
-  /// Over a second older than the newest, or ahead of those before and after; not valid; after the
-  /// end.
+  std::uint64_t pose_jumps = 0;   ///< Tracker jumps; each begins a new segment of poses.
+  std::uint64_t clock_steps = 0;  ///< Clock resets; each starts the mapping again.
+  /// Rejected poses: over a second older than the newest one; ahead of the poses before and after;
+  /// not valid; or after the end.
   std::uint64_t refused_poses = 0;
-  std::uint64_t errors = 0;  ///< Of the mapping and callbacks; see `RefinementState`, too.
-  std::string last_error;    ///< Of these and of refused observations; empty: none.
-  std::string too_large;     ///< Why the queue holds no window; empty: it does.
+  std::uint64_t errors = 0;  ///< Errors of the mapping and callbacks; see `RefinementState`, too.
+  std::string last_error;    ///< Last error, also of rejected samples; empty: none.
+  std::string too_large;     ///< Reason why the queue cannot hold a window; empty: it can.
 
-  /// The part of the received events that is lost (`EventFateRow::is_loss`), 0 to 1.
+  /// Returns the fraction of the received events that are lost (`EventFateRow::is_loss`), 0 to 1.
   double dropRatio() const;
 };
 
-/// The input of a session and its work so far.
+/// Input of a session and its results so far.
 struct SessionStatus {
   MapperCounts counts;  ///< Complete after `finish`.
-  StageTimes times;     ///< Of the stages within the session; the caller fills in the rest.
-  /// Live operation: events of packets that were refused, by camera. In playback an error.
+  StageTimes times;     ///< Stages within the session; the caller fills in the others.
+  /// Events of rejected packets in live operation, by camera. In playback a rejection is an error.
   std::map<int, std::uint64_t> refused_events;
-  /// Playback: events that came while map updating was disabled, by camera.
+  /// Events that came while map updating was disabled, in playback, by camera.
   std::map<int, std::uint64_t> paused_events;
-  std::uint64_t held_events = 0;  ///< Windows may still need them.
+  std::uint64_t held_events = 0;  ///< Events that windows may still need.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.
-  std::map<PoseSourceId, std::uint64_t> other_poses;  ///< Poses of other sources: not used.
-  std::vector<std::uint64_t> silent_keyframes;        ///< Per camera: keyframes without its events.
-  Rig rig;                                    ///< The cameras so far, with the options' overrides.
-  std::size_t recalibrated_cameras = 0;       ///< Cameras whose recorded calibration differs.
-  std::vector<ChosenOption> chosen;           ///< Automatic options, and from what.
-  std::uint64_t choices = 0;                  ///< How often they were chosen.
-  bool scene_unknown = false;                 ///< The last choice found no scene: it is a guess.
-  std::optional<RefinementState> refinement;  ///< Where poses are refined.
-  std::optional<LiveStatus> live{};           ///< In live operation.
+  std::map<PoseSourceId, std::uint64_t> other_poses;  ///< Unused poses of other sources.
+  std::vector<std::uint64_t> silent_keyframes;        ///< Keyframes without events, per camera.
+  Rig rig;                               ///< The cameras so far, with the options' overrides.
+  std::size_t recalibrated_cameras = 0;  ///< Cameras whose recorded calibration differs.
+  std::vector<ChosenOption> chosen;      ///< Automatic options, with their reasons.
+  std::uint64_t choices = 0;             ///< Number of times that options were chosen.
+  bool scene_unknown = false;            ///< True if the last choice found no scene: it is a guess.
+  std::optional<RefinementState> refinement;  ///< Set if poses are refined.
+  std::optional<LiveStatus> live{};           ///< Set in live operation.
 };
 
-/// The automatic options and why, for a log.
+/// Returns the automatic options and their reasons, for a log.
 std::string choiceText(const SessionStatus& status);
 
 }  // namespace efm

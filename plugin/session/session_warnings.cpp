@@ -13,7 +13,7 @@
 namespace efm {
 namespace {
 
-/// What makes a window full, by the policy.
+/// Returns the condition of a full window, by the policy.
 std::string fullWindow(const KeyframePolicyOptions& options) {
   const std::string duration = formatSeconds(durationFromSeconds(options.window_s));
   if (options.policy == KeyframePolicyKind::kEvents) {
@@ -61,7 +61,7 @@ void addUnusedEvents(const SessionStatus& status, const FusionMapperOptions& opt
                "(--poses, [rig] max_pose_gap_s)",
                counts[EventFate::kWithoutPose], wanted);
   }
-  // With limits on time, or windows apart from each other, it is what was asked for.
+  // With time limits, or with gaps between windows, the user asked for this.
   const bool gapless = options.policy.policy != KeyframePolicyKind::kPeriod ||
                        options.policy.stride_s <= options.policy.window_s;
   const bool whole = !options.only_window && !options.limits.t0_ns && !options.limits.t1_ns;
