@@ -15,7 +15,7 @@
 namespace efm {
 namespace {
 
-/// The origin of an option: "rig.ini:3: [dsi]".
+/// Returns the origin of an option: "rig.ini:3: [dsi]".
 std::string originOf(std::string_view line, std::string_view section) {
   return fmt::format("{}: [{}]", line, section);
 }
@@ -25,7 +25,7 @@ template <typename... Values>
   throw std::invalid_argument(fmt::format(format, std::forward<Values>(values)...));
 }
 
-/// What an error says of the known sections.
+/// Returns the part of an error about the known sections.
 std::string expectedSection(std::string_view section) {
   std::vector<std::string> sections;
   for (const NamedOption& option : listOptions({})) {
@@ -40,17 +40,17 @@ void requireSection(std::string_view origin, std::string_view section) {
   refuse("{}: unknown section [{}]: {}", origin, printable(section), expectedSection(section));
 }
 
-/// The origin of what the command line sets.
+/// Origin of options of the command line.
 constexpr std::string_view kSet = "--set";
 
-/// A key as the user gave it: "rig.ini:3: [dsi] num_planes", or "--set dsi.num_planes".
+/// Returns a key as the user gave it: "rig.ini:3: [dsi] num_planes", or "--set dsi.num_planes".
 std::string keyText(const OptionOrigin& origin, std::string_view section, std::string_view key) {
   return origin.name == kSet ? fmt::format("{} {}.{}", kSet, section, printable(key))
                              : fmt::format("{} {}", origin.name, printable(key));
 }
 
-/// What an error says of an unknown key. An earlier version may have had it: the error says the new
-/// name, or that the key is gone.
+/// Returns the error of an unknown key. For a key of an earlier version, it says the new name, or
+/// that the key was removed.
 std::string unknownKey(std::string_view section, std::string_view key) {
   static constexpr struct {
     std::string_view section;
@@ -77,7 +77,7 @@ bool startsComment(std::string_view text) {
   return text.substr(0, 1) == ";" || text.substr(0, 1) == "#" || text.substr(0, 2) == "//";
 }
 
-/// A line, or a value, up to a comment.
+/// Returns a line, or a value, without its comment.
 std::string_view withoutComment(std::string_view line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const bool after_blank = i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t';
@@ -91,7 +91,7 @@ std::string_view withoutComment(std::string_view line) {
 void OptionReader::readFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
-  // Reading, not opening, is what fails for a folder.
+  // A folder can be opened, but not read.
   if (!file || (file.peek() != std::ifstream::traits_type::eof() && !(text << file.rdbuf())) ||
       std::filesystem::is_directory(path)) {
     throw std::runtime_error("cannot read the option file " + path.string());
@@ -101,7 +101,7 @@ void OptionReader::readFile(const std::filesystem::path& path) {
 
 void OptionReader::readText(std::string_view text, const OptionOrigin& file) {
   text = withoutByteOrderMark(text);
-  std::map<OptionId, int> lines;  // of this text
+  std::map<OptionId, int> lines;  // line of each option in this text
   std::string section;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');

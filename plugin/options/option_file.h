@@ -13,10 +13,10 @@
 
 namespace efm {
 
-/// The origin of options: a file.
+/// Origin of options: a file.
 struct OptionOrigin {
-  std::string name;              ///< Errors begin with it: "host.ini, section mapper_dsi:".
-  std::filesystem::path folder;  ///< Paths are relative to it; empty: the working folder.
+  std::string name;              ///< Begin of error texts: "host.ini, section mapper_dsi:".
+  std::filesystem::path folder;  ///< Folder of relative paths; empty: the working folder.
 };
 
 /// Reads options from .ini files and from the command line, strictly: an error names the file and
@@ -28,35 +28,35 @@ struct OptionOrigin {
 /// to the working folder.
 class OptionReader {
  public:
-  /// @param start the values of keys that are not given.
+  /// @param start values of keys that are not given.
   explicit OptionReader(const EventFusionOptions& start = defaultOptions()) : options_(start) {}
 
-  /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
+  /// @throws std::runtime_error if the file cannot be read; std::invalid_argument for an unknown
   /// section or key, a key given twice, or a value of the wrong kind.
   void readFile(const std::filesystem::path& path);
   /// Reads text as `readFile` does.
   void readText(std::string_view text, const OptionOrigin& file);
-  /// Overrides one option: "section.key=value". The last one counts.
+  /// Overrides one option: "section.key=value". The last value of an option counts.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view assignment);
-  /// Sets one option of a host's file, in which its section has another name.
-  /// @param value the text behind the equals sign; a comment may follow the value.
+  /// Sets one option of a host's file, whose section has another name there.
+  /// @param value the text after the equals sign; a comment may follow the value.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view section, std::string_view key, std::string_view value,
            const OptionOrigin& origin);
 
-  /// @throws std::invalid_argument where a value is out of range. Of two values that contradict
-  /// each other, the error begins with the one that was given last.
+  /// @throws std::invalid_argument if a value is out of range. If two values contradict each other,
+  /// the error begins with the value that was given last.
   EventFusionOptions options() const;
 
-  /// Where and how an option was given: "rig.ini:3: [dsi] num_planes = 0", or
-  /// "--set dsi.num_planes=0". Empty if it was not given.
+  /// Returns where and how an option was given: "rig.ini:3: [dsi] num_planes = 0", or "--set
+  /// dsi.num_planes=0". Empty if it was not given.
   std::string given(std::string_view section, std::string_view key) const;
-  /// Where and how those of the options were given that were given: " (rig.ini:3: [dsi] width =
-  /// 9)".
+  /// Returns where and how the options were given, without options that were not given: "
+  /// (rig.ini:3: [dsi] width = 9)".
   std::string origins(const std::vector<OptionId>& options) const;
-  /// The error, without its section, behind where and how its option was given. std::nullopt if it
-  /// was not given.
+  /// Returns the error, without its section, after the place where its option was given;
+  /// std::nullopt if the option was not given.
   std::optional<std::string> wrongOption(const OptionError& error) const;
 
  private:
@@ -66,7 +66,7 @@ class OptionReader {
 
   struct Given {
     std::string text;
-    int order = 0;  // the n-th of all
+    int order = 0;  // number of this assignment, from 1
   };
   EventFusionOptions options_;
   std::map<OptionId, Given> given_;

@@ -17,14 +17,14 @@
 namespace efm {
 namespace {
 
-/// @throws std::invalid_argument saying what is expected, where there is no value.
+/// @throws std::invalid_argument with the expected kind if there is no value.
 template <typename Value>
 Value valueOr(const std::optional<Value>& value, const char* expected) {
   if (!value) throw std::invalid_argument(expected);
   return *value;
 }
 
-/// Items separated by commas, each read by `parse`; nothing where one is none.
+/// Reads items separated by commas. @return std::nullopt if `parse` reads one as std::nullopt.
 template <typename Parse>
 auto parseList(std::string_view text, const Parse& parse) {
   using Item = typename decltype(parse(text))::value_type;
@@ -39,14 +39,14 @@ auto parseList(std::string_view text, const Parse& parse) {
   return items;
 }
 
-/// Nanoseconds from seconds, exactly.
+/// Reads seconds as nanoseconds, exactly.
 std::optional<std::int64_t> parseTime(std::string_view text) {
   const std::optional<std::int64_t> t_ns = parseSeconds(text);
   const bool in_range = t_ns && -kEndOfTimeNs < *t_ns && *t_ns < kEndOfTimeNs;
   return in_range ? t_ns : std::nullopt;
 }
 
-/// Items separated by commas.
+/// Returns the items, separated by commas.
 template <typename Item, typename Text>
 std::string listText(const std::vector<Item>& items, const Text& text_of) {
   std::string list;
@@ -54,15 +54,15 @@ std::string listText(const std::vector<Item>& items, const Text& text_of) {
   return list;
 }
 
-/// The fewest digits that read back the same.
+/// Returns the fewest digits that give the same value when read.
 std::string shortestText(double number) {
   std::array<char, 32> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   return {digits.data(), end};
 }
 
-/// The degrees with the fewest digits that are these radians: the written ones, if they had no more
-/// than 15 digits.
+/// Returns the degrees with the fewest digits that are equal to these radians when read: the
+/// written degrees, if they had no more than 15 digits.
 double degreesThatReadAs(double angle_rad) {
   const double angle_deg = angle_rad / kRadiansPerDegree;
   for (const int decimals : {14, 15, 16}) {
@@ -73,7 +73,7 @@ double degreesThatReadAs(double angle_rad) {
   return angle_deg;
 }
 
-// The functions that know the names of choices. An unknown name's error shows it.
+// Functions that read the names of choices. The error of an unknown name shows the name.
 constexpr auto kChoices = std::make_tuple(
     keyframePolicyFromName, referenceTimeFromName, planeSpacingFromName, fusionRuleFromName,
     fusionOrderFromName, subintervalSplitFromName, subintervalShuffleFromName,
@@ -125,7 +125,7 @@ void parseInto(std::string_view text, double unit, Field& field) {
   }
 }
 
-/// The value of a field, which reads back the same.
+/// Returns the value of a field. Reading it gives the same field.
 template <typename Field>
 OptionValue valueOf(const Field& field, double unit) {
   if constexpr (kIsOptional<Field>) {
@@ -152,7 +152,7 @@ OptionValue valueOf(const Field& field, double unit) {
   }
 }
 
-/// Whether an option's value is chosen from the data; null if it cannot be.
+/// Returns the flag that an option's value is chosen from the data; null if it cannot be.
 template <typename Automatic>
 auto* isChosen(Automatic& automatic, std::string_view key) {
   decltype(&automatic.window_s) chosen = nullptr;

@@ -14,13 +14,13 @@
 
 namespace efm {
 
-/// An option's value, of any kind of field.
+/// Value of an option of any type.
 using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 
-/// The text for a file: numbers have the fewest digits that read back the same.
+/// Returns the text for a file. Numbers have the fewest digits that give the same value when read.
 std::string textOf(const OptionValue& value);
 
-/// Calls `use` with the section and what the lines of option structs say.
+/// Calls `use` with a section and the arguments of each line in the `fields` of option structs.
 template <typename Use>
 struct OptionLines {
   const Use& use;
@@ -37,7 +37,7 @@ struct OptionLines {
 };
 
 /// Calls `use` with the section, key, field and range of all options, in the order of the files.
-/// What reads, sets and lists options uses it alone, and so cannot differ.
+/// Reading, setting and listing of options use only this function, so they cannot differ.
 template <typename Options, typename Use>
 void visitOptions(Options& options, const Use& use) {
   OptionLines<Use> visit{use};
@@ -96,21 +96,21 @@ void visitOptions(Options& options, const Use& use) {
   visit(keyframe.packets);
 }
 
-/// One option as the files name it.
+/// Option with its names in files.
 struct NamedOption {
   std::string_view section;
   std::string_view key;
   OptionValue value;
 };
 
-/// All options, in the order of the files. Their values read back the same.
+/// Returns all options, in the order of the files. Reading a value back gives the same value.
 std::vector<NamedOption> listOptions(const EventFusionOptions& options);
 /// Sets an option from the text of a file. Paths are relative to `folder`.
 /// @return false if there is no such option.
 /// @throws std::invalid_argument saying what is expected: "must be a number, or auto".
 bool setOption(EventFusionOptions& options, std::string_view section, std::string_view key,
                std::string_view text, const std::filesystem::path& folder);
-/// Whether an option file may have a section of this name.
+/// Returns whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 
 }  // namespace efm

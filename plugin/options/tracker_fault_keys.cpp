@@ -15,7 +15,7 @@
 namespace efm {
 namespace {
 
-/// Reads the value of a fault. @return what the value must be, or null if it is that.
+/// Reads the value of a fault. @return the expected kind of value if it is wrong, otherwise null.
 template <typename Field>
 const char* readFault(std::string_view text, const Allowed& allowed, Field& field) {
   if constexpr (std::is_same_v<Field, std::uint64_t>) {
@@ -29,7 +29,7 @@ const char* readFault(std::string_view text, const Allowed& allowed, Field& fiel
     } else {
       field = durationFromSeconds(*number);
     }
-  } else if constexpr (!std::is_same_v<Field, double>) {  // a time, exactly
+  } else if constexpr (!std::is_same_v<Field, double>) {  // a time, read exactly
     const std::optional<std::int64_t> t_ns = parseSeconds(text);
     if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
       return "a time in seconds, within 4.6e9 s of 0";
@@ -39,7 +39,7 @@ const char* readFault(std::string_view text, const Allowed& allowed, Field& fiel
   return nullptr;
 }
 
-/// The value that `readFault` reads, but for the rounding of degrees.
+/// Returns the value that `readFault` reads as this field, except for the rounding of degrees.
 template <typename Field>
 std::optional<OptionValue> valueOfFault(const Allowed& allowed, const Field& field) {
   if constexpr (std::is_same_v<Field, std::optional<std::int64_t>>) {

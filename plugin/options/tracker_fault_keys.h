@@ -11,17 +11,17 @@
 
 namespace efm {
 
-/// A tracker's faults as text, in metres, degrees and seconds; the fields of TrackerFaults say the
-/// meaning of each key. `seed` is the seed of all random draws.
+/// Faults of a tracker as text, in metres, degrees and seconds. The meaning of each key is in the
+/// fields of TrackerFaults. `seed` is the seed of all random draws.
 
 /// Sets one fault from "key=value".
 void setTrackerFault(std::string_view assignment, TrackerFaults& faults);
 
-/// All keys with their values, except keys without a value. Values read back the same, except for
-/// the rounding of degrees.
+/// Returns all keys with their values, without keys that have no value. Reading a value back gives
+/// the same value, except for the rounding of degrees.
 std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const TrackerFaults& faults);
 
-/// "noise_m, noise_deg, ...".
+/// Returns all keys: "noise_m, noise_deg, ...".
 std::string knownTrackerFaults();
 
 }  // namespace efm
