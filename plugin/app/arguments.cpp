@@ -28,7 +28,7 @@ CLI::Validator numberThat(const Holds& holds, const char* expected) {
           ""};
 }
 
-/// The command that the words of the command line chose: "event-fusion evaluate depth".
+/// Returns the command that the command line chose: "event-fusion evaluate depth".
 const CLI::App& chosenCommand(const CLI::App& app, std::string& path) {
   path = app.get_name();
   const CLI::App* command = &app;
@@ -55,7 +55,7 @@ std::vector<std::string> optionsOf(const CLI::App& command) {
   return names;
 }
 
-/// The error for a word of the command line that no option took.
+/// Returns the error for a word of the command line that belongs to no option.
 std::string extraText(const CLI::App& command, const std::string& path, const std::string& word) {
   if (word.front() == '-' && word.size() > 1) {
     const std::string name = word.substr(0, word.find('='));
@@ -78,13 +78,13 @@ void setFaults(const std::vector<std::string>& assignments, TrackerFaults& fault
   }
 }
 
-/// The option files that come with the program, for the end of a help text.
+/// Returns the option files of the program, for the end of a help text.
 std::string configList() {
   const std::string list = fmt::format("{}", fmt::join(configNames(), ", "));
   return list.empty() ? "" : "Option files that come with the program: " + list;
 }
 
-/// An option file before the sources is taken like --config.
+/// Takes an option file before the sources as --config.
 void takeConfig(MappingArguments& arguments) {
   auto& files = arguments.source.files;
   if (files.front().extension() != ".ini") return;
@@ -145,7 +145,7 @@ std::string errorText(const CLI::App& app, const CLI::ParseError& error) {
   const bool wrong_value = dynamic_cast<const CLI::ValidationError*>(&error) != nullptr ||
                            dynamic_cast<const CLI::ConversionError*>(&error) != nullptr ||
                            dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
-  // A mistyped name is the cause of what is missing.
+  // A mistyped name may be the reason of a missing argument.
   const std::vector<std::string> extras = app.remaining(true);
   if (!wrong_value && !extras.empty()) return extraText(command, path, extras.front());
   const std::vector<std::string> commands = commandsOf(command);

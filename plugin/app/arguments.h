@@ -18,11 +18,11 @@
 
 namespace efm {
 
-/// Runs a command and returns the process's exit status.
+/// Function that runs a command and returns the exit status.
 using Run = std::function<int()>;
 
 /// Makes the arguments of a command. They live as long as the command. If the user chooses the
-/// command, `run` becomes a call of `handler` with them.
+/// command, `run` becomes a call of `handler` with these arguments.
 template <typename Arguments>
 std::shared_ptr<Arguments> argumentsOf(CLI::App& command, Run& run,
                                        int (*handler)(const Arguments&)) {
@@ -34,17 +34,17 @@ std::shared_ptr<Arguments> argumentsOf(CLI::App& command, Run& run,
 /// Adds --quiet and, for a command with keyframes, --verbose.
 void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes = false);
 
-/// Checks of an option's value. Their errors show the value and say what was expected.
+/// Checks of an option's value. Their errors show the value and the expected values.
 
 CLI::Validator oneOf(const std::vector<std::string>& names);
 CLI::Validator aboveZero();
 CLI::Validator zeroOrMore();
 
-/// The error of a wrong command line: one sentence that names what the user typed.
+/// Returns the error of a wrong command line: one sentence with the words that the user typed.
 /// @param app has parsed the command line.
 std::string errorText(const CLI::App& app, const CLI::ParseError& error);
 
-/// Adds SOURCE and the options that replace or perturb a part of the recording.
+/// Adds SOURCE and the options that replace or perturb parts of the recording.
 void addSource(CLI::App& command, RecordingSource& source);
 
 /// Adds --t0, --t1 and --duration. @return --t0.
@@ -57,12 +57,12 @@ CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<T
 /// Adds --strict.
 void addStrict(CLI::App& command, bool& strict);
 
-/// A number of seconds, exact to the nanosecond.
+/// Returns a number of seconds as nanoseconds, exactly.
 /// @param name of the option, for errors.
-/// @throws CLI::ValidationError naming the option and its value.
+/// @throws CLI::ValidationError with the option and its value.
 std::int64_t nanosecondsOf(const std::string& text, const std::string& name);
 
-/// For a command without an option file, which has the length of a keyframe.
+/// For commands without an option file, which would give the length of a keyframe.
 /// @throws CLI::ValidationError if there is noise per keyframe, but no length of a keyframe.
 void requireKeyframeLength(const TrackerFaults& faults);
 

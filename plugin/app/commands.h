@@ -19,24 +19,23 @@
 
 namespace efm {
 
-// Each run… function returns the process's exit status.
+// Each `run…` function returns the process's exit status.
 
 struct InfoArguments {
   RecordingSource source;
   TimeArguments times;
-  bool strict = false;  ///< A warning is an error.
-  bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
+  bool strict = false;  ///< True: a warning is an error.
+  bool system = false;  ///< Also print the processor and its kernels; a recording is optional.
   Verbosity verbosity = Verbosity::kNormal;
 };
 
-/// `event-fusion info`: prints the contents of a recording; if quiet, only what is wrong with
-/// it.
+/// `event-fusion info`: prints the contents of a recording; if quiet, only its warnings.
 /// @throws std::exception if the recording cannot be read to its end. The contents before the error
 /// have been printed.
 int runInfo(const InfoArguments& arguments);
 
-/// Linux's "model name", or else the name of the board, which Arm processors have instead;
-/// "unknown" where there is neither.
+/// Returns Linux's "model name" or, on Arm processors without it, the name of the board; "unknown"
+/// if there is neither.
 std::string processorName();
 
 struct ImportArguments {
@@ -47,10 +46,9 @@ struct ImportArguments {
   Verbosity verbosity = Verbosity::kNormal;
 };
 
-/// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other
-/// file.
-/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
-/// is written, and the status is 1.
+/// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, but no other
+/// file. The recording may lack poses or calibration. If it is damaged, the data before the damage
+/// are written, and the status is 1.
 /// @throws Interrupted if a signal came; std::exception if no event can be read or the rawlog
 /// cannot be written. Then there is no rawlog.
 int runImport(const ImportArguments& arguments);
@@ -58,26 +56,26 @@ int runImport(const ImportArguments& arguments);
 struct ExportArguments {
   RecordingSource source;
   TimeArguments times;
-  std::string format;  ///< One of `exportFormats`.
+  std::string format;  ///< A name of `exportFormats`.
   std::filesystem::path out;
   Verbosity verbosity = Verbosity::kNormal;
 };
 
-/// The formats that this build writes.
+/// Returns the formats that this build writes.
 std::vector<std::string> exportFormats();
 
-/// `event-fusion export`: writes a recording for other tools. Stamps have the cameras' time offsets
-/// added; poses are those of camera 0, T_world_cam0. Incomplete recordings and errors: as in
-/// runImport.
+/// `event-fusion export`: writes a recording for other tools. The cameras' time offsets are added
+/// to the time stamps. Poses are those of camera 0, T_world_cam0. Incomplete or damaged recordings
+/// and errors are handled as in `runImport`.
 int runExport(const ExportArguments& arguments);
 
 struct ViewArguments {
   std::filesystem::path path;  ///< The folder of a map, or its map.html.
 };
 
-/// `event-fusion view`: opens map.html with the program that the system has for pages (`xdg-open`,
-/// `open`), and prints its path. Where there is no screen or no such program, stderr says so; that
-/// is no error: the page is there for any browser.
+/// `event-fusion view`: opens map.html with the system's program for pages (`xdg-open`, `open`),
+/// and prints its path. If there is no screen or no such program, it says so on stderr. This is no
+/// error: any browser can open the page.
 int runView(const ViewArguments& arguments);
 
 /// The common arguments of `map` and `depth`.
@@ -85,11 +83,11 @@ struct MappingArguments {
   /// The option file, its name without ".ini" (see `findConfig`), or empty: the defaults.
   std::string config;
   RecordingSource source;
-  TimeArguments times;          ///< Of the window, for `depth`.
+  TimeArguments times;          ///< Limits of the recording; for `depth`, of the window.
   std::filesystem::path out;    ///< Empty: named after the recording, in the working folder.
-  bool force = false;           ///< Write into a folder that holds other files.
-  bool plain_pictures = false;  ///< depth.png and confidence.png without enlargement and bar.
-  bool strict = false;          ///< A warning is an error.
+  bool force = false;           ///< Allow a folder that holds other files.
+  bool plain_pictures = false;  ///< No enlargement or colour bar in depth.png and confidence.png.
+  bool strict = false;          ///< True: a warning is an error.
   Verbosity verbosity = Verbosity::kNormal;
   std::vector<std::string> sets;  ///< section.key=value
 };
@@ -100,24 +98,23 @@ struct MapArguments : MappingArguments {
 };
 
 struct DepthArguments : MappingArguments {
-  /// Time of the reference view. Default: middle or end of the window, by the options.
+  /// Time of the reference view. Default: middle or end of the window, as the options say.
   std::optional<TimeArgument> t_ref;
   bool save_dsi = false;
 };
 
 /// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
-/// warnings and errors to stderr.
-/// SIGINT, SIGTERM or SIGHUP ends the run as the end of the recording would; a second one kills it.
-/// In the first look at the recording (automatic options) it ends without a result: Interrupted.
-/// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
-/// stopped it.
+/// warnings and errors to stderr. SIGINT, SIGTERM or SIGHUP ends the run as the end of the
+/// recording would; a second signal kills it. During the first look at the recording (automatic
+/// options), a signal ends the run without a result: Interrupted.
+/// @return the status: 0 only if the whole recording is mapped, 130 if a signal stopped the run.
 /// @throws std::exception if the options or the recording cannot be read, or a file cannot be
 /// written.
 int runMap(const MapArguments& arguments);
 
-/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP ends it without a result,
-/// unless the keyframe is made: then its files are written.
-/// @throws Interrupted if a signal came before; an earlier result stays.
+/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP before the keyframe is made
+/// ends the run without a result. After that, the files of the keyframe are written.
+/// @throws Interrupted if a signal came before the keyframe; an earlier result stays.
 int runDepth(const DepthArguments& arguments);
 
 struct SimulateArguments {
@@ -128,7 +125,7 @@ struct SimulateArguments {
   std::optional<std::int64_t> start_ns;
   std::optional<double> duration_s;
   std::uint64_t seed = 1;
-  // Default: the preset's pixels, or ideal ones.
+  // Default: the preset's thresholds, or those of ideal pixels.
   std::optional<double> threshold_on;
   std::optional<double> threshold_off;
   double mismatch = 0;
@@ -140,8 +137,8 @@ struct SimulateArguments {
 
 /// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset
 /// folder.
-/// @throws Interrupted if a signal came; then there is no result.
-/// @throws std::exception if the arguments are not valid or something cannot be written.
+/// @throws Interrupted if a signal came; std::exception if the arguments are not valid or a file
+/// cannot be written. Then there is no result.
 int runSimulate(const SimulateArguments& arguments);
 
 /// The common arguments of `evaluate`.
@@ -171,13 +168,13 @@ struct EvaluateTrajectoryArguments : EvaluateArguments {
 };
 
 /// `event-fusion evaluate …`: prints the errors of results and draws them if asked for.
-/// @throws std::exception if something cannot be compared or written.
+/// @throws std::exception if the results cannot be compared, or a file cannot be written.
 int runEvaluateDepth(const EvaluateDepthArguments& arguments);
 int runEvaluateMap(const EvaluateMapArguments& arguments);
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments);
 
-/// Parses the command line. Prints the help or the version.
-/// @return runs the chosen command, if there is one, and returns the process's exit status.
+/// Parses the command line. Prints the help or the version, if asked for.
+/// @return a function that runs the chosen command, if there is one, and returns the exit status.
 /// @throws UsageError if the command line is wrong.
 std::function<int()> parseCommandLine(int argc, char** argv);
 

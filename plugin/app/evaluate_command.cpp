@@ -18,7 +18,7 @@
 namespace efm {
 namespace {
 
-/// The given focal length and baseline; a missing one comes from the folders.
+/// Returns the given focal length and baseline; a missing value comes from the folders.
 std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& arguments) {
   if (arguments.focal_px && arguments.baseline_m) {
     return StereoBaseline{*arguments.focal_px, *arguments.baseline_m, "as given"};
@@ -34,8 +34,8 @@ std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& argum
   return stereo;
 }
 
-/// @param third an input beside the estimate and the truth; may be empty. Each may be a folder
-/// whose files are read.
+/// Rejects a plot that would replace an input. Inputs may be folders whose files are read.
+/// @param third input beside the estimate and the truth; may be empty.
 void refusePlotOver(const EvaluateArguments& arguments, const std::filesystem::path& third = {}) {
   if (arguments.plot.empty()) return;
   const std::vector<std::filesystem::path> inputs = {arguments.estimate, arguments.truth, third};
@@ -57,7 +57,7 @@ void addOutput(CLI::App& command, EvaluateArguments& arguments, const std::strin
   command.add_option("--plot", arguments.plot, "Also draw " + plotted)->type_name("FILE.png");
 }
 
-/// An option with a list of positive numbers.
+/// Adds an option with a list of positive numbers.
 CLI::Option* addList(CLI::App& command, const std::string& name, std::vector<double>& values,
                      const std::string& help) {
   return command.add_option(name, values, help)

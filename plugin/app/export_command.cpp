@@ -35,10 +35,10 @@ int runImport(const ImportArguments& arguments) {
   const Interruption interruption;
   const auto writer = mrptLibrary(arguments.out.string() + ": a rawlog")
                           .writeRawlog(arguments.out, arguments.compression);
-  std::map<std::string, std::uint64_t> events;  // per label
+  std::map<std::string, std::uint64_t> events;  // by label
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;
-  std::uint64_t odometry = 0;  // of them
+  std::uint64_t odometry = 0;  // poses from odometry
   std::uint64_t others = 0;
   std::map<int, CameraModel> cameras;
   std::optional<std::string> damage;
@@ -104,7 +104,7 @@ const std::vector<ExportFormat>& formats() {
   return all;
 }
 
-/// The result's rig has camera 0's frame, and no time offsets: these are added to the stamps.
+/// Opens the writer. Its rig has camera 0's frame, and no time offsets: the stamps include them.
 std::unique_ptr<RecordingWriter> openWriter(const ExportArguments& arguments, Rig rig) {
   const Rigid3 T_cam0_rig = rig.cameras[0].T_rig_cam.inverse();
   for (RigCamera& camera : rig.cameras) {
@@ -127,7 +127,7 @@ std::vector<std::string> exportFormats() {
 
 int runExport(const ExportArguments& arguments) {
   refuseToReplace(arguments.out, inputsOf(arguments.source));
-  if (std::filesystem::is_regular_file(arguments.out)) {  // a writer fills an empty folder
+  if (std::filesystem::is_regular_file(arguments.out)) {  // an empty folder is allowed
     throw std::runtime_error(arguments.out.string() +
                              ": it exists: expected the name of a new file or folder");
   }

@@ -29,11 +29,11 @@
 namespace efm {
 namespace {
 
-/// The contents of a recording.
+/// Contents of a recording.
 struct Contents {
   std::uint64_t observations = 0;
   RecordingStatistics statistics;
-  std::map<std::string, std::uint64_t> others;  // by class
+  std::map<std::string, std::uint64_t> others;  // number of other samples, by class
 
   void add(const Sample& sample) {
     ++observations;
@@ -60,7 +60,7 @@ void printStream(const StreamStatistics& stream, const char* what) {
   fmt::print("\n");
 }
 
-/// The rate of a camera's events over the time of all cameras' events.
+/// Prints a camera's event rate over the time of all cameras' events.
 void printRate(const EventRate& rate, std::int64_t first_ns, std::int64_t last_ns) {
   constexpr int kIntervals = 40;
   const std::vector<double> rates = rate.over(first_ns, last_ns, kIntervals);
@@ -120,7 +120,7 @@ void print(const Contents& contents, const RecordingCounts& counts) {
   }
 }
 
-/// Prints the values that `map` would choose, and uses their depths for the checks.
+/// Prints the values that `map` would choose, and uses the chosen depths for the checks.
 /// @return the warnings about the poses.
 std::vector<Warning> judge(FirstLook& look, bool quiet, Findings& findings) {
   const RecordingSurvey survey = look.finish();
@@ -140,7 +140,7 @@ std::vector<Warning> judge(FirstLook& look, bool quiet, Findings& findings) {
   return survey.judgePoses(options).warnings;
 }
 
-/// The sizes of the data caches, as far as the system tells them.
+/// Returns the sizes of the data caches that the system reports.
 std::string cacheSizes() {
   std::string sizes;
   for (const auto& [name, key] : {std::pair("L1d", _SC_LEVEL1_DCACHE_SIZE),
@@ -153,7 +153,7 @@ std::string cacheSizes() {
   return sizes.empty() ? "unknown" : sizes;
 }
 
-/// The processor, its cores and caches, the kernels that it can run and the one that is chosen.
+/// Prints the processor, its cores and caches, its kernels and the chosen kernel.
 void printSystem() {
   fmt::print("event-fusion {}\nprocessor: {}\ncores: {}\ncaches: {}\n", EFM_VERSION,
              processorName(), SpaceSweepOptions().threadsOrCores(), cacheSizes());
@@ -194,7 +194,7 @@ int runInfo(const InfoArguments& arguments) {
   if (const auto truth = openTruth(source); !truth.empty() && !quiet) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
-  if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
+  if (stopped) std::rethrow_exception(stopped);  // warnings of missing parts would be wrong then
   if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source.limits, *recording);
   Findings findings{contents.statistics, recording->counts()};
   std::vector<Warning> warnings;

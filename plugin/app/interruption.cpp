@@ -14,14 +14,14 @@ namespace {
 
 constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
 
-/// `timeout` sends its signal twice: to the process and to its group.
+/// Time in which signals count as one: `timeout` signals the process and its group.
 constexpr double kSameSignalS = 0.3;
 constexpr std::string_view kNote =
     "\nevent-fusion: stopping as soon as possible; a second signal ends it at once\n";
 
 volatile std::sig_atomic_t signal_came = 0;
 volatile std::sig_atomic_t on_terminal = 0;
-std::timespec came_at;  // the handler's alone
+std::timespec came_at;  // used by the handler only
 std::array<struct sigaction, kSignals.size()> earlier_actions;
 
 double secondsSince(const std::timespec& before) {
@@ -31,7 +31,7 @@ double secondsSince(const std::timespec& before) {
          1e-9 * static_cast<double>(now.tv_nsec - before.tv_nsec);
 }
 
-/// All calls are safe in a handler, which the signals do not interrupt.
+/// Handles a signal. All calls are safe in a handler, and the signals do not interrupt it.
 void noteSignal(int signal) {
   const int error = errno;
   if (signal_came == 0) {
@@ -42,7 +42,7 @@ void noteSignal(int signal) {
     }
   } else if (secondsSince(came_at) > kSameSignalS) {
     std::signal(signal, SIG_DFL);
-    raise(signal);  // when the handler returns
+    raise(signal);  // takes effect when the handler returns
   }
   errno = error;
 }
@@ -58,7 +58,7 @@ Interruption::Interruption() {
   for (const int signal : kSignals) sigaddset(&action.sa_mask, signal);
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     sigaction(kSignals[i], nullptr, &earlier_actions[i]);
-    // A shell starts background jobs with signals ignored: they stay so.
+    // A shell starts background jobs with ignored signals: they stay ignored.
     if (earlier_actions[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
   }
 }

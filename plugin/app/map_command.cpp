@@ -40,8 +40,8 @@ OptionReader readerOf(const MappingArguments& arguments) {
   });
 }
 
-/// The recording with the options' calibration and hand-eye transform, and with their stride for
-/// tracker noise that is constant over a keyframe.
+/// Returns the recording with the options' calibration and hand-eye transform. The options' stride
+/// is the length of tracker noise that is constant over a keyframe.
 RecordingSource sourceOf(const MappingArguments& arguments, const OptionReader& reader,
                          const EventFusionOptions& options) {
   RecordingSource source = arguments.source;
@@ -53,7 +53,7 @@ RecordingSource sourceOf(const MappingArguments& arguments, const OptionReader& 
   if (arguments.source.hand_eye.empty()) source.hand_eye_given = reader.given("rig", "hand_eye");
   source.setup = options.rig.setup;
   source.time_offsets_ns = options.rig.time_offsets_ns;
-  source.override_rig = false;  // the mapping's options do
+  source.override_rig = false;  // the mapping applies the options
   PosePerturbationOptions& perturbation = source.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
@@ -63,11 +63,11 @@ RecordingSource sourceOf(const MappingArguments& arguments, const OptionReader& 
   return source;
 }
 
-/// With the content of the files that they name, which are read once.
+/// Returns the options with the content of their files, which are read once.
 EventFusionOptions optionsOf(const MappingArguments& arguments, const OptionReader& reader) {
   EventFusionOptions options = asUsage([&] { return reader.options(); });
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
-  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
+  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // a single source
   if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
   options.rig.setup =
       std::make_shared<RigSetup>(readRigSetup(sourceOf(arguments, reader, options)));
@@ -105,7 +105,7 @@ void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
              *step_m, origin.x(), origin.y(), origin.z());
 }
 
-/// Without MRPT, prints a note instead.
+/// Writes map.simplemap. Without MRPT, prints a note instead.
 void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyframes) {
   const MrptLibrary* library = nullptr;
   try {
@@ -119,7 +119,7 @@ void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyfra
   });
 }
 
-/// Opens a window. The library with MRPT's windows is loaded by this call alone.
+/// Opens a window. Only this call loads the library with MRPT's windows.
 std::unique_ptr<MapWindow> openWindow() {
   const char* const display = std::getenv("DISPLAY");
   if (!display || *display == '\0') {
@@ -143,7 +143,7 @@ Window windowOf(const DepthArguments& arguments, const RecordingSource& source,
   return window;
 }
 
-/// "NAME_map" or "NAME_depth" in the working folder, after the first source.
+/// Returns --out or "NAME_map", "NAME_depth" in the working folder, after the first source.
 std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind kind) {
   if (!arguments.out.empty()) return arguments.out;
   std::filesystem::path source = std::filesystem::absolute(arguments.source.files.at(0));
@@ -154,7 +154,7 @@ std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind
   return name + (kind == OutputKind::kMap ? "_map" : "_depth");
 }
 
-/// The recording's files in a form that another run from another folder gets, too.
+/// Returns the recording's files as paths that do not depend on the working folder.
 std::vector<std::string> namesOf(const RecordingSource& source) {
   std::vector<std::string> names;
   for (const std::filesystem::path& file : source.files) {
@@ -163,7 +163,7 @@ std::vector<std::string> namesOf(const RecordingSource& source) {
   return names;
 }
 
-/// What this run is going to replace, unless it is a complete result of the same recording.
+/// Warns of replacing a result, except a complete result of the same recording.
 std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
                                          const RecordingSource& source) {
   const auto earlier = MapOutput::earlierResult(folder);
@@ -183,7 +183,7 @@ std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
   return {{"replaced-result", text}};
 }
 
-/// All files that a run reads.
+/// Returns all files that a run reads.
 std::vector<std::filesystem::path> inputsOf(const MappingArguments& arguments,
                                             const RecordingSource& source) {
   std::vector<std::filesystem::path> inputs = inputsOf(source);
@@ -191,8 +191,8 @@ std::vector<std::filesystem::path> inputsOf(const MappingArguments& arguments,
   return inputs;
 }
 
-/// Refuses a folder with an input. One that holds something else than an earlier result of the same
-/// kind is probably a mistake.
+/// Rejects a folder with an input. A folder with files that do not belong to an earlier result of
+/// the same kind is probably a mistake.
 void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
                         const MappingArguments& arguments, const RecordingSource& source) {
   refuseToReplace(folder, inputsOf(arguments, source));
@@ -212,7 +212,7 @@ void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
   }
 }
 
-/// What `map` and `depth` do before and after their loop over a recording: the options and the
+/// Steps of `map` and `depth` before and after their loop over a recording: the options and the
 /// recording, the first look, the folder of the result, its report and the exit status.
 class MapCommand {
  public:
@@ -232,24 +232,24 @@ class MapCommand {
   std::optional<MapOutput> output;
   MapReport report;
 
-  /// With the options so far: the stride may be chosen later.
+  /// Returns the recording for the options so far: the stride may be chosen later.
   RecordingSource source() const { return sourceOf(arguments, reader, options); }
 
   /// Checks the folder of the result, takes the first look and opens the recording to map it.
   void begin();
-  /// Writes a file of the result. An error keeps no other file from being written.
+  /// Writes a file of the result. After an error, other files are written all the same.
   void write(const std::function<void()>& file);
-  /// Fills in the report, but for its points. @return the map.
+  /// Fills in the report, except its points. @return the map.
   std::shared_ptr<const MapSnapshot> describe(MappingRun& run, bool stopped);
-  /// Warns if the map has no points, few, or some so far away that floats are too coarse.
+  /// Warns if the map has no points, few points, or points too far away for floats.
   void judgePoints(const MapCloud& points);
   /// Ends the measured time of the mapping and its files.
   void endTimes(const KeyframeWriter& writer);
   /// Writes the report, and prints the warnings, the summary and the error.
   /// @return the exit status.
   int conclude(std::optional<UserError> error);
-  /// Within a handler: throws the error again, in the words of the user.
-  /// @param written the keyframes that are in the folder.
+  /// Throws the current error again, as text for the user; called within a handler.
+  /// @param written number of keyframes in the folder.
   [[noreturn]] void rethrow(int written) const;
 
  private:
@@ -282,7 +282,7 @@ void MapCommand::begin() {
 }
 
 /// Chooses the automatic options, and warns of poses that do not explain the events.
-/// @return the recording again, if its events fit into `[live] max_queue_mb`.
+/// @return the recording again, if its events fit into `[live] max_queue_mb`; otherwise null.
 std::unique_ptr<Recording> MapCommand::firstLook() {
   auto held = std::make_unique<HeldRecording>(openRecording(source()), options.live.max_queue_mb);
   FirstLook look(options);
@@ -297,7 +297,7 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
       return std::nullopt;
     }
   };
-  bool takes = true;  // what it rejects, the mapping reports
+  bool takes = true;  // the mapping reports rejected samples
   std::optional<Sample> sample;
   while ((takes || options.live.enabled) && (sample = next())) {
     takes = look.take(*sample);
@@ -332,7 +332,7 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
   return held;
 }
 
-/// A pass over the recording for max_confidence = sequence: the robust maximum of the keyframes'
+/// Passes over the recording for max_confidence = sequence: the robust maximum of the keyframes'
 /// confidences. It costs as much as the mapping. @return std::nullopt if there is no keyframe.
 std::optional<double> MapCommand::sequenceMaximum() {
   if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
@@ -388,7 +388,7 @@ std::shared_ptr<const MapSnapshot> MapCommand::describe(MappingRun& run, bool st
 
 void MapCommand::judgePoints(const MapCloud& points) {
   warnOfNoPoints(report);
-  constexpr std::uint64_t kFewPoints = 200;  // little evidence, however sure each of them is
+  constexpr std::uint64_t kFewPoints = 200;  // fewer are little evidence, even if each is sure
   if (report.points < kFewPoints && report.counts.keyframes > 0) {
     report.doubts.push_back(fmt::format("the map has {} points", report.points));
   }
@@ -411,7 +411,7 @@ std::string MapCommand::stays() const {
 int MapCommand::conclude(std::optional<UserError> error) {
   if (!error) error = write_error_;
   report.peak_memory_bytes = peakMemoryBytes();
-  // A run without a keyframe, or one that cannot write a file, leaves the result of an earlier run.
+  // The result of an earlier run stays if this run has no keyframe or cannot write a file.
   const bool replaces = report.counts.keyframes > 0 && !(output->keepsEarlier() && write_error_);
   if (replaces || !std::filesystem::exists(output->folder() / "report.json")) {
     write([&] { output->writeReport(reportJson(report)); });
@@ -455,7 +455,7 @@ void MapCommand::rethrow(int written) const {
   }
 }
 
-/// Those who see the map after each keyframe: a window, and a folder of frames.
+/// Watchers of the map after each keyframe: a window, and a folder of frames.
 class Watchers {
  public:
   Watchers(const MapArguments& arguments, const MapCommand& command) {
@@ -478,7 +478,7 @@ class Watchers {
     }
     watched_s_ += run.seconds() - start_s;
   }
-  /// The window stays until the user closes it, if there is a user.
+  /// Keeps the window until the user closes it, if there is a user.
   void wait(const Interruption& interruption) {
     const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
     if (!window_ || !interactive || !window_->isOpen()) return;
@@ -493,7 +493,7 @@ class Watchers {
   double watched_s_ = 0;
 };
 
-/// The file of the whole DSI, if it is asked for.
+/// Opens the file of the whole DSI; null if it is not asked for.
 std::unique_ptr<NpyDsiFile> dsiFile(const MapCommand& command, const DepthArguments& arguments) {
   const KeyframeMapperOptions& keyframe = command.options.mapper.keyframe;
   const auto reference = static_cast<std::size_t>(keyframe.reference_camera);
@@ -504,7 +504,7 @@ std::unique_ptr<NpyDsiFile> dsiFile(const MapCommand& command, const DepthArgume
                                       makeReferenceView(cameras[reference].model, keyframe.view));
 }
 
-/// Writes the files of a map, but for its page and its report.
+/// Writes the files of a map, except its page and its report.
 void writeMap(MapCommand& command, const MapSnapshot& map, const KeyframeSheet& sheet) {
   MapOutput& output = *command.output;
   const EventFusionOptions& options = command.options;
@@ -527,7 +527,7 @@ void writeMap(MapCommand& command, const MapSnapshot& map, const KeyframeSheet& 
   });
 }
 
-/// Writes map.html, which shows the report, and adds its time to the report's.
+/// Writes map.html, which shows the report, and adds the time to the report.
 void writePage(MapCommand& command, const MapSnapshot& map, const KeyframePictures& pictures) {
   MapReport& report = command.report;
   double real_s = 0, cpu_s = 0;
@@ -627,7 +627,7 @@ int runDepth(const DepthArguments& arguments) {
                    });
     run.mapper().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
     run.mapper().setSink(dsi.get());
-    while (run.mapNext()) {  // a part of the window is no result; a keyframe is
+    while (run.mapNext()) {  // without its keyframe, a window has no result
       if (!made) command.interruption.check();
     }
     run.finish();

@@ -26,16 +26,16 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
       progress_(activity, verbosity) {
   options.validate();
   first_.statistics.setWindow(statisticsOptions(options).window_s);
-  Mapper::Callbacks callbacks;  // the warnings summarise what the others say
+  Mapper::Callbacks callbacks;  // other messages are summarised in the warnings
   callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
     if (!options_.live.enabled) return deliver(keyframe);
-    const std::lock_guard<std::mutex> lock(made_mutex_);  // the mapper's own thread
+    const std::lock_guard<std::mutex> lock(made_mutex_);  // called in the mapper's own thread
     made_.push_back(keyframe);
   };
   mapper_ = Mapper::make(options, std::move(callbacks));
 }
 
-/// Runs a step. @return false if it throws; the run's error is the first message.
+/// Runs a step. @return false if it throws. The run's error is the first exception.
 template <typename Step>
 bool MappingRun::attempt(const Step& step) {
   bool more = false;
@@ -49,8 +49,8 @@ bool MappingRun::attempt(const Step& step) {
   return more;
 }
 
-/// The mapper's errors about a sample get its place. Without a section they are not about options
-/// then: the sample has a calibration of its own.
+/// Notes an error. If the mapper rejected a sample, the text begins with the sample's position. An
+/// OptionError without a section is then about the sample's own calibration, not about options.
 void MappingRun::noteError(const std::exception& caught) {
   error_ = userError(caught);
   if (!rejected_) return;
@@ -68,7 +68,7 @@ void MappingRun::finish() {
   attempt([this] { return mapper_->finish(), false; });
 }
 
-/// @return false at the recording's end.
+/// @return false at the end of the recording.
 bool MappingRun::feedNext() {
   std::optional<Sample> sample;
   {
@@ -103,7 +103,7 @@ void MappingRun::waitForTimeOf(const Sample& sample) {
   std::this_thread::sleep_until(began_ + std::chrono::nanoseconds(t_ns - *first_ns_));
 }
 
-/// An error of writing must not count as an error of reading: it is thrown after the step.
+/// Delivers a keyframe. An error of writing is thrown after the step: it is no error of reading.
 void MappingRun::deliver(const KeyframeDepthMap& keyframe) {
   if (receive_error_) return;
   depths_.add(keyframe);
@@ -115,7 +115,7 @@ void MappingRun::deliver(const KeyframeDepthMap& keyframe) {
   }
 }
 
-/// Live operation: the keyframes that the mapper's thread has made, in this thread.
+/// Delivers the keyframes of the mapper's thread in this thread, in live operation.
 void MappingRun::deliverMade() {
   std::vector<KeyframeDepthMap> made;
   {
@@ -157,7 +157,7 @@ void MappingRun::showProgress() {
   progress_.show(fraction(), details);
 }
 
-/// By the events' time if its end is known, otherwise by the input.
+/// Computed from the events' time if its end is known, otherwise from the input.
 double MappingRun::fraction() const {
   const TimeLimits limits = options_.mapper.interval();
   if (!limits.t1_ns) return recording_.progress();
@@ -169,7 +169,7 @@ double MappingRun::fraction() const {
       1.0);
 }
 
-/// For --verbose: what a keyframe has, and the time that its stages took.
+/// Returns the line of a keyframe for --verbose: its contents, and the times of its stages.
 std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
   const SessionStatus status = mapper_->status();
   const StageSeconds& now = status.times.real;
@@ -195,7 +195,7 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (c == reference || !isSelected(static_cast<int>(c), options.cameras)) continue;
     const double distance_m = baselineOf(rig.cameras[c], rig.cameras[reference]);
-    if (distance_m == 0) continue;  // as good as one camera
+    if (distance_m == 0) continue;  // equal to a single camera
     report.baseline_m = std::min(report.baseline_m.value_or(distance_m), distance_m);
   }
 }

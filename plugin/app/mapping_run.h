@@ -22,45 +22,45 @@
 
 namespace efm {
 
-/// What a first pass found, and the mapping goes on with.
+/// Results of a first pass that the mapping uses.
 struct FirstPass {
   std::vector<ChosenOption> chosen;  ///< The options that were automatic.
-  RecordingStatistics statistics;    ///< Of the events; the mapping adds the poses.
+  RecordingStatistics statistics;    ///< Statistics of the events; the mapping adds the poses.
 };
 
-/// Feeds a recording to a mapper sample by sample, with progress on stderr, and keeps what the
-/// report needs. In live operation the recording is played at the speed of the sensor.
+/// Feeds a recording to a mapper sample by sample, with progress on stderr, and keeps the data for
+/// the report. In live operation the recording is played at the speed of the sensor.
 ///
-/// If the recording is damaged, what comes before the damage is mapped.
+/// If the recording is damaged, the data before the damage are mapped.
 class MappingRun {
  public:
-  /// Gets each keyframe, in order, in the caller's thread. What it throws ends the run.
+  /// Receives each keyframe, in order, in the caller's thread. Its exceptions end the run.
   using Receive = std::function<void(const KeyframeDepthMap&, const MappingRun&)>;
 
-  /// @param recording outlives this.
+  /// @param recording must live longer than this object.
   /// @throws std::invalid_argument if the options are not valid.
   MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
              Verbosity verbosity, Receive receive, const std::string& activity = "mapping");
 
   Mapper& mapper() { return *mapper_; }
 
-  /// Maps the next sample. @return false at the end of the recording, or at its damage.
+  /// Maps the next sample. @return false at the end or at the damage of the recording.
   bool mapNext();
   /// Maps the rest.
   void finish();
 
-  /// The fraction of the work that is done, 0 to 1.
+  /// Returns the fraction of the work that is done, 0 to 1.
   double fraction() const;
-  /// The map so far, for those who watch it grow.
-  /// @param watched_s the time that they took: the rates are without it.
+  /// Returns the map so far, for watchers.
+  /// @param watched_s time that the watchers took: it is left out of the rates.
   WatchedMap watched(const KeyframeDepthMap& newest, double watched_s) const;
   double seconds() const { return progress_.seconds(); }
 
-  /// The damage of the recording, or why there is no keyframe; std::nullopt if the map is complete.
+  /// Returns the damage of the recording, or why there is no keyframe; std::nullopt without error.
   const std::optional<UserError>& error() const { return error_; }
-  /// Adds what the run found to a report, which has the warnings and doubts of the first look. To
-  /// be called once, after `finish`.
-  /// @param stopped the user ended the run.
+  /// Adds the results of the run to a report that has the warnings and doubts of the first look.
+  /// Call it once, after `finish`.
+  /// @param stopped true if the user ended the run.
   void describe(MapReport& report, bool stopped);
 
  private:
@@ -83,29 +83,29 @@ class MappingRun {
   DepthStatistics depths_;
   std::exception_ptr receive_error_;
   std::optional<UserError> error_;
-  bool rejected_ = false;                 // a sample, by the mapper
-  std::mutex made_mutex_;                 // of made_
-  std::vector<KeyframeDepthMap> made_;    // in live operation, not delivered
-  std::optional<std::int64_t> first_ns_;  // in live operation, of the first sample
+  bool rejected_ = false;                 // true if the mapper rejected a sample
+  std::mutex made_mutex_;                 // guards made_
+  std::vector<KeyframeDepthMap> made_;    // in live operation: not delivered yet
+  std::optional<std::int64_t> first_ns_;  // in live operation: time of the first sample
   std::chrono::steady_clock::time_point began_;
-  StageSeconds told_;  // until the last keyframe
+  StageSeconds told_;  // stage times until the last reported keyframe
   Progress progress_;
   std::shared_ptr<Mapper> mapper_;  // last, never null: its thread uses the others
 };
 
-/// Samples that were read once, to be read again without opening the recording: as long as their
-/// events fit into some memory.
+/// Samples that were read once and can be read again without opening the recording, as long as
+/// their events fit into a given memory.
 class HeldRecording : public Recording {
  public:
   HeldRecording(std::unique_ptr<Recording> read, double max_mb)
       : read_(std::move(read)), bytes_left_(max_mb * 1e6) {}
 
-  /// The recording that is read now.
+  /// Returns the recording that is being read.
   Recording& read() { return *read_; }
   void hold(Sample sample);
-  /// @param error that ended the recording, or null.
+  /// Ends the reading. @param error that ended the recording, or null.
   void end(std::exception_ptr error);
-  /// Whether it holds all of the recording.
+  /// Returns whether it holds the whole recording.
   bool isWhole() const { return ended_ && bytes_left_ >= 0; }
 
   std::optional<Sample> next() override;

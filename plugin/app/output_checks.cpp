@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSuffix = ".ini";
 
-/// Empty if there is none.
+/// Returns the folder of the option files; empty if there is none.
 fs::path configFolder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
@@ -29,7 +29,7 @@ fs::path configFolder() {
   return fs::is_directory(source, error) ? source : fs::path();
 }
 
-/// With all links followed, as far as the path exists.
+/// Returns a path with all links followed, in its existing part.
 fs::path resolved(const fs::path& path) {
   std::error_code error;
   fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
@@ -47,7 +47,7 @@ bool isBelow(const fs::path& path, const fs::path& folder) {
   return end == folder.end();
 }
 
-/// The file in a folder that is an input by a link.
+/// Returns the file in a folder that links to an input; empty if there is none.
 fs::path linkTo(const fs::path& input, const fs::path& folder) {
   std::error_code unreadable;
   const auto skip = fs::directory_options::skip_permission_denied;
@@ -76,7 +76,7 @@ fs::path findConfig(const std::string& name_or_path) {
   const fs::path path = name_or_path;
   if (fs::is_regular_file(path, ignored)) return path;
   if (path.extension() == kSuffix) {
-    if (fs::exists(path, ignored)) return path;  // reading it says what it is
+    if (fs::exists(path, ignored)) return path;  // reading reports the error
     throw UsageError(name_or_path + ": no such option file");
   }
   const std::vector<std::string> names = configNames();

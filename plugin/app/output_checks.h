@@ -9,26 +9,26 @@
 
 namespace efm {
 
-/// The option files that come with the program. They lie in the project's config/, or where
-/// `cmake --install` puts them: ../share/event-fusion-mapper/config from the program.
+/// The option files of the program lie in the project's config/, or where `cmake --install` puts
+/// them: ../share/event-fusion-mapper/config from the program.
 
-/// Their names without ".ini", sorted: "default", "dsec", …
+/// Returns the names of the option files without ".ini", sorted: "default", "dsec", …
 std::vector<std::string> configNames();
 
-/// The option file of a name. A path is returned as it is.
-/// @throws UsageError if there is no such file, or naming the known names if it is none of them.
+/// Returns the option file of a name. A path is returned unchanged.
+/// @throws UsageError if there is no such file, or, with the known names, if the name is unknown.
 std::filesystem::path findConfig(const std::string& name_or_path);
 
-/// The files and folders that a recording is read from.
+/// Returns the files and folders from which a recording is read.
 std::vector<std::filesystem::path> inputsOf(const RecordingSource& source);
 
-/// Refuses an output that would replace an input. Links are followed, and hard links are found.
-/// @param out the file or the folder to write. A folder must neither be an input nor hold one.
-/// @param inputs those that are empty or do not exist are left out.
+/// Rejects an output that would replace an input. Links are followed, and hard links are found.
+/// @param out file or folder to write. A folder must neither be an input nor hold an input.
+/// @param inputs empty or missing inputs are ignored.
 void refuseToReplace(const std::filesystem::path& out,
                      const std::vector<std::filesystem::path>& inputs);
 
-/// Refuses an existing file in one of the folders that are read.
+/// Rejects an existing file in a folder that is read.
 void refuseFileIn(const std::vector<std::filesystem::path>& folders,
                   const std::filesystem::path& out);
 

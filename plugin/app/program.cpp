@@ -28,8 +28,8 @@ constexpr const char* kOutOfMemory =
     "or a "
     "shorter interval (--duration)";
 
-/// MRPT's exceptions hold their place, too: "==== MRPT exception ====\nMessage:  TEXT\nLocation:
-/// …".
+/// Removes the place from the text of MRPT's exceptions: "==== MRPT exception ====\nMessage:
+/// TEXT\nLocation: …".
 std::string withoutPlace(std::string text) {
   constexpr std::string_view kBegin = "==== MRPT exception ====";
   constexpr std::string_view kMessage = "Message:";
@@ -43,7 +43,7 @@ std::string withoutPlace(std::string text) {
   return text.erase(begin, end - begin);
 }
 
-/// Blanks and ends of lines become one blank each.
+/// Returns the text with one blank for each sequence of blanks and line ends.
 std::string onOneLine(const std::string& text) {
   std::string line;
   for (const std::string_view word : splitWords(text, " \t\r\v\f\n")) {
@@ -52,7 +52,7 @@ std::string onOneLine(const std::string& text) {
   return line;
 }
 
-/// The standard library's exceptions, also within the text of another one.
+/// Returns whether an exception of the standard library is the cause, also within another text.
 bool isOutOfMemory(std::string_view text) {
   for (const std::string_view sign : {"std::bad_alloc", "std::bad_array_new_length",
                                       "cannot create std::", "vector::", "basic_string::_M"}) {
@@ -86,7 +86,7 @@ UserError userError(const std::exception& error) {
     return {kOutOfMemory, {{"dsi", "num_planes"}, {"dsi", "width"}}};
   }
   if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
-    return {"the system refuses: " + system->code().message()};  // a thread, for instance
+    return {"the system refuses: " + system->code().message()};  // for example, a thread
   }
   const std::string text = withoutPlace(error.what());
   UserError result{text == error.what() ? text : onOneLine(text)};

@@ -11,10 +11,10 @@
 
 namespace efm {
 
-/// The exit statuses of the program: 0, and these. Its help lists them.
-inline constexpr int kFailedStatus = 1;         ///< The job could not be done; --strict.
-inline constexpr int kUsageStatus = 2;          ///< The command line or an option file is wrong.
-inline constexpr int kInterruptedStatus = 130;  ///< Stopped as requested: a shell's for SIGINT.
+/// Exit statuses of the program, beside 0. Its help lists them.
+inline constexpr int kFailedStatus = 1;  ///< The job could not be done, or warnings with --strict.
+inline constexpr int kUsageStatus = 2;   ///< The command line or an option file is wrong.
+inline constexpr int kInterruptedStatus = 130;  ///< Stopped as requested; as shells for SIGINT.
 
 /// The command line or an option file is wrong.
 class UsageError : public std::invalid_argument {
@@ -22,7 +22,7 @@ class UsageError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// Runs a step whose std::invalid_argument is the fault of the command line: a UsageError then.
+/// Runs a step. If it throws std::invalid_argument, the command line is wrong: a UsageError.
 template <typename Step>
 auto asUsage(const Step& step) {
   try {
@@ -35,12 +35,12 @@ auto asUsage(const Step& step) {
 /// Prints an error to stderr, "event-fusion: error: …". @return the status.
 int fail(const std::string& message, int status = kFailedStatus);
 
-/// An error in words for the user, and what it says of options.
+/// Error as text for the user, and the options that it concerns.
 struct UserError {
   std::string text;
-  std::vector<OptionId> options{};     ///< Those that the text names.
-  std::optional<OptionError> wrong{};  ///< The value that is out of range.
-  std::string more{};                  ///< The end of the text, behind the error itself.
+  std::vector<OptionId> options{};     ///< Options that the text names.
+  std::optional<OptionError> wrong{};  ///< Option whose value is out of range.
+  std::string more{};                  ///< End of the text, after the error itself.
 
   void add(const std::string& end) {
     text += end;
@@ -49,13 +49,12 @@ struct UserError {
 };
 UserError userError(const std::exception& error);
 
-/// The text alone: one sentence, without what a library adds for its
-/// programmers (call stacks, places in its sources, names of types).
+/// Returns the text of the error only: one sentence, without the additions of libraries for
+/// programmers (call stacks, places in sources, names of types).
 std::string inWords(const std::exception& error);
 
-/// The program `event-fusion`: runs the command of the command line. Prints every error to stderr.
-/// @return the process's exit status, one of those above: 0 only if the command has done its job
-/// and stdout took its output.
+/// Runs the program `event-fusion` with a command line. Prints every error to stderr.
+/// @return the exit status: 0 only if the command has done its job and stdout took its output.
 int runProgram(int argc, char** argv);
 
 }  // namespace efm

@@ -17,7 +17,7 @@ namespace efm {
 namespace {
 
 constexpr double kTerminalPeriodS = 0.2;
-constexpr double kFirstPlainPeriodS = 10;  // shorter runs stay quiet
+constexpr double kFirstPlainPeriodS = 10;  // shorter runs print nothing
 constexpr double kMaxPlainPeriodS = 60;
 constexpr const char* kClearLine = "\r\033[K";
 
@@ -80,9 +80,9 @@ void Progress::print(const std::string& line) {
   output_.stream << line << std::endl;
 }
 
-/// " 43 %, 12 s left, details".
+/// Returns " 43 %, 12 s left, details".
 std::string Progress::text(double fraction, const std::string& details) const {
-  constexpr double kMinFraction = 0.01;  // before, the rest is a guess
+  constexpr double kMinFraction = 0.01;  // with less, the remaining time is a guess
   std::string text = fmt::format(" {:3.0f} %", std::floor(100 * fraction));
   if (fraction >= kMinFraction && fraction < 1) {
     text += fmt::format(", {} left", durationText(seconds() * (1 - fraction) / fraction));
@@ -91,11 +91,11 @@ std::string Progress::text(double fraction, const std::string& details) const {
   return text;
 }
 
-/// The activity, a bar where there is room for it, and the text, within the terminal's width.
+/// Returns activity, bar (if it fits) and text, within the width of the terminal in columns.
 std::string Progress::withBar(const std::string& text, double fraction, int columns) const {
   constexpr int kMinBar = 8;
   constexpr int kMaxBar = 40;
-  // The last column stays free: some terminals wrap a line that fills it.
+  // The last column stays free, because some terminals wrap a full line.
   const int room = std::max(columns - 1, 0);
   const int bar = std::min(room - static_cast<int>(activity_.size() + text.size() + 3), kMaxBar);
   if (bar < kMinBar) return (activity_ + text).substr(0, static_cast<std::size_t>(room));

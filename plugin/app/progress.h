@@ -8,19 +8,19 @@
 
 namespace efm {
 
-/// How much a command says.
+/// Amount of a command's output.
 enum class Verbosity {
   kQuiet,    ///< Warnings and errors.
-  kNormal,   ///< Progress and a summary, too.
-  kVerbose,  ///< A line per keyframe, too.
+  kNormal,   ///< Also progress and a summary.
+  kVerbose,  ///< Also a line per keyframe.
 };
 
-/// Where progress is shown.
+/// Output of the progress.
 struct ProgressOutput {
   std::ostream& stream;
-  /// The width of the terminal in characters; nothing if the stream is no terminal.
+  /// Returns the width of the terminal in characters; std::nullopt if the stream is no terminal.
   std::function<std::optional<int>()> columns;
-  /// Seconds of real time since any start.
+  /// Returns seconds of real time since an arbitrary start.
   std::function<double()> clock;
 
   static ProgressOutput standardError();
@@ -30,8 +30,8 @@ struct ProgressOutput {
 ///
 ///     mapping [=========            ]  43 %, 12 s left, 31 keyframes
 ///
-/// On a terminal one line as wide as the terminal, five times a second; it is removed at the end.
-/// Elsewhere a plain line after 10, 30, 70 and 130 seconds, and then every minute.
+/// A terminal has one line of its width, renewed five times a second and removed at the end.
+/// Elsewhere, plain lines are printed after 10, 30, 70 and 130 seconds, then every minute.
 class Progress {
  public:
   explicit Progress(std::string activity, Verbosity verbosity = Verbosity::kNormal,
@@ -41,17 +41,17 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Begins another activity, whose fraction is not known. On a terminal it is shown at once.
+  /// Begins another activity without a known fraction. A terminal shows it at once.
   void begin(std::string activity);
-  /// Whether it is time for a line.
+  /// Returns whether a line is due.
   bool due() const;
   /// Shows a line if it is due.
   /// @param fraction of the work, 0 to 1.
-  /// @param details follow the fraction; may be empty.
+  /// @param details text after the fraction; may be empty.
   void show(double fraction, const std::string& details = {});
-  /// Real time since the construction, or since `begin`.
+  /// Returns the real time since the construction, or since `begin`.
   double seconds() const;
-  /// With Verbosity::kVerbose, prints a line that stays.
+  /// Prints a line that stays, if verbosity is kVerbose.
   void print(const std::string& line);
 
  private:

@@ -26,7 +26,7 @@ bool failStrictly(const std::vector<Warning>& warnings) {
 
 std::int64_t RecordingTimes::start() {
   if (start_ns_) return *start_ns_;
-  RecordingSource events;  // their times need no pose and no transform
+  RecordingSource events;  // their times need neither poses nor transforms
   events.files = source_.files;
   events.format = source_.format;
   events.calibration = source_.calibration;

@@ -18,23 +18,23 @@ namespace efm {
 /// Prints a line per warning to stderr: "event-fusion: warning: NAME: text".
 void printWarnings(const std::vector<Warning>& warnings);
 
-/// For --strict: prints an error if there are warnings. @return whether there are.
+/// Prints an error if there are warnings, for --strict. @return true if there are warnings.
 bool failStrictly(const std::vector<Warning>& warnings);
 
-/// A time on the command line: on the recording's clock, or ("+3.2") from its first event on.
+/// Time on the command line: on the recording's clock or, as "+3.2", from its first event on.
 struct TimeArgument {
   std::int64_t ns = 0;
   bool from_start = false;
 };
 
-/// An interval of a recording on the command line.
+/// Interval of a recording on the command line.
 struct TimeArguments {
   std::optional<TimeArgument> t0;
   std::optional<TimeArgument> t1;
-  std::optional<std::int64_t> duration_ns;  ///< From t0, or from the first event.
+  std::optional<std::int64_t> duration_ns;  ///< Duration from t0, or from the first event.
 };
 
-/// The times of the command line on the recording's clock. The recording is opened at most once,
+/// Converts times of the command line to the recording's clock. Opens the recording at most once,
 /// and only if a time counts from its first event.
 class RecordingTimes {
  public:
@@ -48,22 +48,22 @@ class RecordingTimes {
   std::int64_t start();
 
   RecordingSource source_;
-  std::optional<std::int64_t> start_ns_;  // of the first event, once it is known
+  std::optional<std::int64_t> start_ns_;  // time of the first event, once it is known
 };
 
 /// Reads a recording to its end, or to its damage.
-/// @param take receives each sample; what it throws ends the reading.
-/// @return the error of the recording, if it was not read to its end.
+/// @param take receives each sample; its exceptions end the reading.
+/// @return the error of the recording; std::nullopt if the recording was read to its end.
 std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take);
 
-/// Why an interval of a recording has no events: the times of the nearest ones that were read.
+/// Returns the error of an interval without events: it names the times of the nearest events.
 std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts);
 
 /// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
-/// @param recording which was read, and had no event.
+/// @param recording was read, and had no event.
 void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
 
-/// Reports the damage that ended a recording, after all before it was written.
+/// Reports the damage that ended a recording, after the data before it were written.
 /// @return the process's exit status.
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
               const std::filesystem::path& out);

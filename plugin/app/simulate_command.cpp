@@ -35,8 +35,8 @@ void requireRate(const char* option, double hz) {
                 "0 to 1e5 (events per second and pixel)");
 }
 
-/// The simulator checks these ranges, too. Here the errors have the names and units of the command
-/// line.
+/// Checks the ranges of the arguments. The simulator checks them, too, but these errors have the
+/// names and units of the command line.
 void requireRanges(const SimulateArguments& arguments) {
   if (arguments.duration_s) {
     requireOption(*arguments.duration_s >= 0.001 && *arguments.duration_s <= 600, "--duration",
@@ -70,7 +70,7 @@ Simulation makeOnTrajectory(const SimulateArguments& arguments) {
   options.seed = arguments.seed;
   const std::vector<StampedPose> poses = readTumTrajectory(arguments.trajectory);
   Rig rig = readCamchain(arguments.calibration);
-  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // simulated cameras agree
+  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // they share a clock
   try {
     return makeTrajectorySimulation(options, poses, rig);
   } catch (const std::invalid_argument& error) {
@@ -119,7 +119,7 @@ int runSimulate(const SimulateArguments& arguments) {
       arguments.preset.empty() ? makeOnTrajectory(arguments) : makePreset(arguments);
   setPixels(arguments, simulation);
   const Interruption interruption;
-  NewFolder folder(arguments.out);  // an error is known before the simulation runs
+  NewFolder folder(arguments.out);  // reports errors before the simulation runs
   std::vector<CameraRecording> recordings;
   {
     Progress progress("simulating", arguments.verbosity);

@@ -34,13 +34,13 @@ std::filesystem::path pageIn(const std::filesystem::path& path) {
   throw std::runtime_error((path / "map.html").string() + why);
 }
 
-/// @return whether the system's program for pages took it.
+/// @return true if the system's program for pages opened the page.
 bool openPage(const std::filesystem::path& page) {
 #ifdef __APPLE__
   const char* const opener = "open";
 #else
   const char* const opener = "xdg-open";
-  // Without a screen xdg-open may start a browser of the terminal, which shows no map.
+  // Without a screen, xdg-open may start a text browser, which cannot show a map.
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
 #endif
   const std::string file = page.string();
