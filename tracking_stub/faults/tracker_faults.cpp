@@ -26,10 +26,10 @@ std::vector<StampedPose> withoutLost(const std::vector<StampedPose>& poses,
     const std::int64_t begin_ns = from_ns + durationFromSeconds(std::min(wait_s, kMaxWaitS));
     return TimeGap{begin_ns, begin_ns + durationFromSeconds(options.random_gap_s)};
   };
-  std::optional<TimeGap> random_gap;  // the current or the next one
+  std::optional<TimeGap> random_gap;  // the current gap or the next one
   std::vector<StampedPose> kept;
   for (const StampedPose& pose : poses) {
-    // Drawn for every pose, lost or not: a gap does not change the loss of other poses.
+    // A number is drawn for every pose, lost or not, so that a gap does not change other losses.
     bool lost = single.uniform() < options.drop_probability;
     if (options.random_gaps_hz > 0) {
       if (!random_gap) random_gap = gap_after(pose.t_ns);
@@ -74,10 +74,10 @@ class Perturbation {
   std::vector<StampedPose> moved;
 
  private:
-  /// Each kind of error has its own seed: one option does not change the random numbers of another.
+  /// Each kind of error has its own seed, so an option does not change the other kinds' numbers.
   enum class Kind { kPose = 0x706f, kKeyframe, kDrift };
 
-  /// A pose without noise, and its noise.
+  /// A pose without noise, and the noise to add.
   struct NoisyPose {
     std::int64_t t_ns = 0;
     Rigid3 T_world_rig;
@@ -88,7 +88,7 @@ class Perturbation {
     return RandomNumbers(options_.seed, static_cast<std::uint64_t>(kind)).next();
   }
 
-  /// @param number the time of a pose, or the number of an interval.
+  /// @param number time of a pose, or number of an interval.
   Rigid3 noiseOf(Kind kind, std::int64_t number, double noise_m, double noise_rad) const {
     RandomNumbers random(seedOf(kind), static_cast<std::uint64_t>(number));
     const Eigen::Vector3d shift_world = noise_m * normalVector(random);
@@ -147,7 +147,7 @@ class Perturbation {
     return value / by - (value % by < 0 ? 1 : 0);
   }
 
-  /// The error is a rotation about the rig and a shift. @param pose the first one of the interval.
+  /// Sets the error: a rotation about the rig and a shift. @param pose first pose of the interval.
   void enterInterval(std::int64_t interval, const NoisyPose& pose) {
     const KeyframeNoiseOptions& keyframe = options_.keyframe;
     const Rigid3 noise = noiseOf(Kind::kKeyframe, interval, keyframe.noise_m, keyframe.noise_rad);
@@ -170,11 +170,11 @@ class Perturbation {
   Eigen::Vector3d direction_world_;  // of the drift of the position
   Eigen::Vector3d axis_world_;       // of the drift of the heading
   double path_length_m_ = 0;
-  Eigen::Vector3d true_world_;       // the previous position
+  Eigen::Vector3d true_world_;       // the previous position without drift
   std::optional<NoisyPose> before_;  // the previous pose, with drift
-  std::int64_t start_ns_ = 0;        // of interval 0
-  std::int64_t interval_ = 0;        // of the previous pose
-  Rigid3 error_;                     // of that interval
+  std::int64_t start_ns_ = 0;        // begin of interval 0
+  std::int64_t interval_ = 0;        // interval of the previous pose
+  Rigid3 error_;                     // error of that interval
 };
 
 }  // namespace
@@ -183,7 +183,7 @@ void TrackerFaults::validate() const {
   const auto& [noise_m, noise_rad, length_ns, start_ns] = perturbation.keyframe;
   requireOption(!perturbation.keyframe.any() || length_ns, "length_ns of keyframes", "nothing",
                 "given where there is noise per keyframe");
-  // A short length may come from the stride of keyframes, not from `keyframe_s`.
+  // A short length may come from the stride of keyframes instead of `keyframe_s`.
   requireOption(!length_ns || (*length_ns >= 1'000'000 && *length_ns <= 1'000'000'000'000'000),
                 "length_ns of keyframes", length_ns.value_or(0), "1e6 to 1e15");
   requireOption(!start_ns || (*start_ns > -kEndOfTimeNs && *start_ns < kEndOfTimeNs),

@@ -12,15 +12,15 @@
 
 namespace efm {
 
-/// Noise that is constant within a time interval, the window of a keyframe. The default is none.
+/// Noise that is constant within a time interval, such as the window of a keyframe. Default: none.
 ///
-/// It moves all poses of an interval rigidly. The depth map of a window inside the interval does
-/// not change. Where an interval begins, two interpolated poses are inserted: one a tick before the
-/// jump and one after it. So interpolation does not carry the jump into an interval.
+/// The noise moves all poses of an interval rigidly. The depth map of a window inside the interval
+/// does not change. At the begin of each interval, two interpolated poses are inserted: one a tick
+/// before the jump and one after it. So interpolation does not carry the jump into an interval.
 struct KeyframeNoiseOptions {
   double noise_m = 0;    ///< Standard deviation on each axis.
   double noise_rad = 0;  ///< Standard deviation on each axis.
-  /// Length of the intervals. Required where there is noise.
+  /// Length of the intervals. Required if there is noise.
   std::optional<std::int64_t> length_ns;
   /// Start of interval 0. Default: the time of the first pose.
   std::optional<std::int64_t> start_ns;
@@ -28,55 +28,55 @@ struct KeyframeNoiseOptions {
   bool any() const { return noise_m > 0 || noise_rad > 0; }
 };
 
-/// Drift of odometry. The default is none.
+/// Drift of odometry. Default: none.
 ///
 /// The heading rotates about one axis and the position moves in one direction, both in proportion
 /// to the path length so far. Axis and direction are random unit vectors in the world.
 struct PoseDriftOptions {
-  double fraction = 0;   ///< Of the path length: metres per metre.
-  double rad_per_m = 0;  ///< Rotation of the heading.
+  double fraction = 0;   ///< Drift of the position per path length: metres per metre.
+  double rad_per_m = 0;  ///< Rotation of the heading per path length.
 
   bool any() const { return fraction > 0 || rad_per_m > 0; }
 };
 
-/// Errors of a tracker's poses. The default is none.
+/// Errors of a tracker's poses. Default: none.
 ///
 /// Drift, noise per keyframe and noise per pose are added in this order. Each has its own random
-/// numbers. Noise per pose is drawn by stamp: a pose keeps its noise when other poses are lost. The
-/// noise of a position is in the world frame, that of a rotation about the rig's axes.
+/// numbers. Noise per pose is drawn by time stamp: a pose keeps its noise when other poses are
+/// lost. Noise of a position is in the world frame; noise of a rotation is about the rig's axes.
 struct PosePerturbationOptions {
   /// Independent noise of each pose: standard deviation on each axis.
-  double noise_m = 0;    ///< Of the position.
-  double noise_rad = 0;  ///< Of the rotation.
+  double noise_m = 0;    ///< Metres, of the position.
+  double noise_rad = 0;  ///< Radians, of the rotation.
   KeyframeNoiseOptions keyframe;
   PoseDriftOptions drift;
-  /// Poses are not interpolated across longer gaps. See TrajectoryOptions.
+  /// Longest gap across which poses are interpolated. See TrajectoryOptions.
   double max_pose_gap_s = TrajectoryOptions().max_pose_gap_s;
-  std::int64_t tick_ns = 1;  ///< Stamps are multiples of it, 1 to 999999.
+  std::int64_t tick_ns = 1;  ///< Time stamps are multiples of this, 1 to 999999.
   std::uint64_t seed = 0;
 
   bool any() const { return noise_m > 0 || noise_rad > 0 || keyframe.any() || drift.any(); }
 };
 
-/// Poses that a tracker loses. The default is none.
+/// Poses that a tracker loses. Default: none.
 struct PoseDropoutOptions {
-  double drop_probability = 0;  ///< Of each pose.
+  double drop_probability = 0;  ///< Probability that a pose is lost.
   double random_gaps_hz = 0;    ///< Random gaps per second of tracking.
   double random_gap_s = 0.5;    ///< Length of a random gap.
   std::uint64_t seed = 0;
 };
 
-/// All faults of a tracker. The default is none.
+/// All faults of a tracker. Default: none.
 struct TrackerFaults {
   PosePerturbationOptions perturbation;
   PoseDropoutOptions dropouts;
-  std::int64_t latency_ns = 0;  ///< Between a pose's stamp and its arrival.
+  std::int64_t latency_ns = 0;  ///< Time between a pose's stamp and its arrival.
 
   bool any() const {
     return perturbation.any() || dropouts.drop_probability > 0 || dropouts.random_gaps_hz > 0 ||
            latency_ns > 0;
   }
-  /// The keys and values of `--perturb`: metres, degrees and seconds. Not `tick_ns`.
+  /// Visits the keys of `--perturb`, in metres, degrees and seconds. `tick_ns` has no key.
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
     const Allowed metres = Allowed::from(0, 1000, "a number, 0 to 1000 (metres)");
@@ -101,15 +101,15 @@ struct TrackerFaults {
     visit("gaps_hz", self.dropouts.random_gaps_hz,
           Allowed::from(0, 1000, "a number, 0 to 1000 (gaps per second)"));
     visit("gap_s", self.dropouts.random_gap_s, seconds);
-    visit("seed", poses.seed);  // of the dropouts, too
+    visit("seed", poses.seed);  // seed of the dropouts, too
   }
   void validate() const;
 };
 
-/// The poses of a tracker with faults, in their order: lost poses are left out, then the others are
-/// moved, and jumps are marked by inserted poses. Latency changes no pose: who merges poses and
-/// events delays them. A pose that is not finite, or has a time beyond kEndOfTimeNs, is not moved.
-/// @throws std::invalid_argument where a pose to move is older than the one before it.
+/// Returns the poses of a tracker with faults, in their order: lost poses are left out, the others
+/// are moved, and jumps are marked by inserted poses. Latency changes no pose: the caller delays
+/// poses when it merges them with events. Infinite or NaN poses and times beyond kEndOfTimeNs stay.
+/// @throws std::invalid_argument if a pose to move is older than the pose before it.
 std::vector<StampedPose> withFaults(const std::vector<StampedPose>& poses,
                                     const TrackerFaults& faults);
 
