@@ -73,14 +73,14 @@ void EventPackets::readAhead() {
   }
 }
 
-/// The end of the grid's period that contains a time.
+/// Returns the end of the grid period that contains a time.
 std::int64_t EventPackets::periodEnd(std::int64_t t_ns) const {
   std::int64_t rest_ns = t_ns % period_ns_;
   if (rest_ns < 0) rest_ns += period_ns_;
   return t_ns - rest_ns + period_ns_;
 }
 
-/// Whether no further event can belong to the first packet.
+/// Returns whether no further event can belong to the first packet.
 bool EventPackets::packetIsComplete() const {
   if (first_ == events_.size()) return false;
   std::int64_t end_ns = periodEnd(events_[first_].t_ns);
@@ -90,7 +90,7 @@ bool EventPackets::packetIsComplete() const {
   return newest_ns_ - kMaxEventDelayNs >= end_ns;
 }
 
-/// An error comes after the events before it.
+/// Reads the next block. Events before damage are kept: the error is thrown after them.
 void EventPackets::readBlock() {
   std::exception_ptr damaged;
   try {
@@ -117,7 +117,7 @@ bool EventPackets::isGood(const Event& event) const {
   return event.x < size_.width && event.y < size_.height && event.t_ns < kEndOfTimeNs && in_order;
 }
 
-/// Why an event of the block is not good.
+/// Describes why an event of the block is wrong.
 std::string EventPackets::problemOf(std::size_t i) const {
   const auto problem = [&](const char* name, const auto& value, const std::string& expected) {
     return fmt::format("{}: {} = '{}': expected {}", stream_->positionOf(i), name, value, expected);
@@ -164,7 +164,7 @@ void EventPackets::takeBlock() {
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
     if (ahead_) settleAhead(event.t_ns);
-    if (ended_) return;  // also from errors behind it
+    if (ended_) return;  // errors after this time do not matter
     if (!isGood(event)) {
       refuse(problemOf(i));
     } else if (event.t_ns - newest_ns_ <= kFarAheadNs || newest_ns_ == -kEndOfTimeNs) {
@@ -177,9 +177,9 @@ void EventPackets::takeBlock() {
   refuseEqualTimes();
 }
 
-/// Counts in whole blocks, which costs nothing: so many events of one time fill some.
+/// Counts in whole blocks, which costs nothing: too many events of one time fill several blocks.
 void EventPackets::refuseEqualTimes() {
-  constexpr std::int64_t kMaxPixels = std::int64_t{1} << 21;  // where the sensor is not known
+  constexpr std::int64_t kMaxPixels = std::int64_t{1} << 21;  // if the sensor is unknown
   const auto pixels = std::min(kMaxPixels, std::int64_t{1} * size_.width * size_.height);
   const bool equal = !block_.empty() && block_.front().t_ns == block_.back().t_ns &&
                      block_.front().t_ns == newest_ns_;
@@ -191,7 +191,7 @@ void EventPackets::refuseEqualTimes() {
       stream_->positionOf(block_.size() - 1), formatSeconds(newest_ns_), equal_times_));
 }
 
-/// Takes the event far ahead, or refuses it where the next one is back in the order without it.
+/// Takes the event that is far ahead, or rejects it if the next event is in order without it.
 void EventPackets::settleAhead(std::int64_t next_ns) {
   const Event ahead = *std::exchange(ahead_, std::nullopt);
   const bool back = next_ns < ahead.t_ns - kMaxEventDelayNs;
@@ -199,7 +199,7 @@ void EventPackets::settleAhead(std::int64_t next_ns) {
   take(ahead);
 }
 
-/// Leaves out a wrong event.
+/// Leaves out a wrong event, or throws its error if wrong events are not allowed.
 void EventPackets::refuse(const std::string& problem) {
   if (bad_ == nullptr) throw std::runtime_error(problem);
   bad_->skip(problem);

@@ -26,7 +26,7 @@ std::string messageOf(archive* opened) {
   return text != nullptr ? text : "it is damaged";
 }
 
-/// Advances to the next file in the archive; null at its end.
+/// Advances to the next file in the archive and returns its name; null at the archive's end.
 const char* nextMember(archive* opened, const std::filesystem::path& file) {
   for (;;) {
     archive_entry* entry = nullptr;

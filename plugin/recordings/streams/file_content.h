@@ -13,26 +13,26 @@ struct archive;
 
 namespace efm {
 
-/// Whether a file is compressed (gzip, bzip2, xz, Zstandard) or a zip archive, by its first bytes.
-/// Never throws.
+/// Returns whether the first bytes are those of a compressed file (gzip, bzip2, xz, Zstandard) or a
+/// zip archive. Never throws.
 bool isCompressed(const std::filesystem::path& file);
 
-/// The bytes of a file from front to back; of a compressed file, and of a member of a zip archive,
-/// those of its content. Memory is that of a block.
+/// Reads the bytes of a file from front to back. Compressed files and members of zip archives are
+/// unpacked. Memory holds one block.
 class FileContent {
  public:
-  /// @param member of a zip archive; empty: its only file.
-  /// @throws std::runtime_error if the file cannot be opened, has no such member or several, or
-  /// this build does not read archives (EFM_READ_ARCHIVES).
+  /// @param member name of a file in a zip archive; empty: the only file in it.
+  /// @throws std::runtime_error if the file cannot be opened, has no such member, has several files
+  /// for an empty `member`, or if this build does not read archives (EFM_READ_ARCHIVES).
   explicit FileContent(std::filesystem::path file, const std::string& member = {});
 
   /// @return the number of bytes read: fewer than `count` only at the end.
   std::size_t read(char* to, std::size_t count);
-  /// The rest.
-  /// @throws std::runtime_error as `read`, and where it is longer than `max_bytes`.
+  /// Reads the rest of the file.
+  /// @throws std::runtime_error as `read`, and if the rest is longer than `max_bytes`.
   std::string readAll(std::size_t max_bytes);
 
-  /// The size of a plain file. Other ones, and pipes, cannot seek: 0.
+  /// The size of a plain file; 0 for compressed files and pipes, which cannot seek.
   std::uint64_t seekableBytes() const { return archive_ ? 0 : bytes_; }
   /// Continues at a byte of a plain file.
   void seek(std::uint64_t byte);
@@ -54,12 +54,12 @@ class FileContent {
   std::unique_ptr<archive, CloseArchive> archive_;
 };
 
-/// The first bytes of a file's content: fewer if it has fewer.
+/// Returns the first `count` bytes of a file's content, or all bytes if there are fewer.
 /// @throws std::runtime_error as `FileContent`.
 std::string firstContentOf(const std::filesystem::path& file, std::size_t count,
                            const std::string& member = {});
 
-/// The names of the files in a zip archive, in its order.
+/// Returns the names of the files in a zip archive, in the order of the archive.
 /// @throws std::runtime_error as `FileContent`.
 std::vector<std::string> membersOf(const std::filesystem::path& file);
 

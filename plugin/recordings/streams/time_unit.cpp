@@ -13,8 +13,7 @@ namespace {
 
 constexpr std::array<int, 4> kExponents = {0, -3, -6, -9};
 
-/// The number of things in a second, if the times count 10^exponent seconds; 0 where it is not
-/// known.
+/// Returns the events or poses per second if the unit is 10^exponent seconds; 0 if unknown.
 double rateOf(const TimeSample& sample, int exponent) {
   const double seconds = (sample.latest - sample.earliest) * std::pow(10.0, exponent);
   return seconds > 0 ? (sample.count - 1) / seconds : 0;
@@ -24,7 +23,7 @@ bool fitsTime(const TimeSample& sample, int exponent) {
   return sample.max * std::pow(10.0, exponent) < 1e-9 * static_cast<double>(kEndOfTimeNs);
 }
 
-/// The unit with a usual rate; of several, the one in the middle of the usual rates.
+/// Returns the unit whose rate is usual and nearest to the middle of the usual rates.
 std::optional<int> likelyExponent(const TimeSample& sample, const UsualRate& usual) {
   std::optional<int> likely;
   double least = std::log(usual.max / usual.min) / 2;
@@ -39,7 +38,7 @@ std::optional<int> likelyExponent(const TimeSample& sample, const UsualRate& usu
   return likely;
 }
 
-/// The unit in which the times are of today's dates; the numbers of two units are 1000 apart.
+/// Returns the unit in which the times are dates of today: at most one, as units differ by 1000.
 std::optional<int> datedExponent(const TimeSample& sample) {
   constexpr double kYear2000S = 946'684'800;
   constexpr double kYear2050S = 2'524'608'000;
@@ -50,7 +49,7 @@ std::optional<int> datedExponent(const TimeSample& sample) {
   return std::nullopt;
 }
 
-/// "probably us, where 1000 events take 0.01 s"
+/// Describes the likely unit: "probably us, where 1000 events take 0.01 s".
 std::string guessOf(const TimeSample& sample, const UsualRate& usual) {
   const std::optional<int> likely = likelyExponent(sample, usual);
   if (!likely) return "expected decimal seconds, or --time-unit s, ms, us or ns";
@@ -67,7 +66,7 @@ std::string guessOf(const TimeSample& sample, const UsualRate& usual) {
 std::optional<int> timeExponentOf(std::string_view unit) {
   constexpr struct {
     int exponent;
-    std::string_view names;  // between blanks
+    std::string_view names;  // each between blanks
   } kUnits[] = {{0, " s sec secs second seconds "},
                 {-3, " ms msec msecs millisecond milliseconds "},
                 {-6, " us µs μs usec usecs microsecond microseconds "},
@@ -181,7 +180,7 @@ HeaderWord headerWord(std::string_view text) {
     word.time_exponent = timeExponentOf(word.unit);
     return word;
   }
-  // "us": a unit alone. "s" may be another thing.
+  // "us" alone is a unit. "s" alone may mean something else.
   if (const auto unit = word.name.size() > 1 ? timeExponentOf(word.name) : std::nullopt) {
     return {"t", word.name, unit};
   }
