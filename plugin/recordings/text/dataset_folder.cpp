@@ -33,7 +33,7 @@ std::size_t countCameras(const fs::path& folder) {
   return count;
 }
 
-/// The size of the first existing image of images.txt.
+/// Returns the size of the first existing image of images.txt; std::nullopt if there is none.
 std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
   std::ifstream list(folder / "images.txt");
   std::string line;

@@ -13,23 +13,22 @@ namespace efm {
 ///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
 ///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
-///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
-/// Other files are ignored, but events of a further camera than those of camchain.yaml are an
-/// error.
+///   depth/index.txt   the truth, optional: t file, depth maps of camera 0 (see TruthDepth)
+/// Other files are ignored. Events of a camera that camchain.yaml does not have are an error.
 
-/// Whether the folder has a camchain.yaml, or events in cam0.
+/// Returns whether the folder has a camchain.yaml, or events in cam0.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
-/// Without camchain.yaml, the cameras are cam0, cam1, … without gaps.
+/// Opens a folder. The cameras are those of camchain.yaml, else cam0, cam1, … without gaps.
 RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folders,
                                  const ReaderOptions& options);
 
-/// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
-/// the parts have none.
+/// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), if the
+/// parts have none.
 void addFolderFiles(const std::filesystem::path& folder, const ReaderOptions& options,
                     RecordingParts& parts);
 
-/// The depth maps that the folder's depth/index.txt lists, a line `t file` each; none without it.
+/// Returns the depth maps in depth/index.txt, one line `t file` each; none without this file.
 std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
 
 /// The text layout of the UZH event camera dataset (Mueggler et al., IJRR 2017), one camera:
@@ -38,7 +37,7 @@ std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
 ///   calib.txt         fx fy cx cy k1 k2 p1 p2 k3
 ///   images.txt        t file, optional: the size of the first existing image is the sensor's.
 
-/// Whether the folder has events.
+/// Returns whether the folder has events.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
 
 /// @throws std::runtime_error naming the file (and line) that is missing or wrong.

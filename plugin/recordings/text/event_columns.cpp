@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kSampledLines = 5000;
 
-/// With semicolons, commas are decimal ones.
+/// Returns a line's separator. If it has semicolons, its commas are decimal commas.
 char separatorOf(std::string_view line) {
   if (line.find(';') != std::string_view::npos) return ';';
   return line.find(',') != std::string_view::npos ? ',' : ' ';
@@ -39,14 +39,14 @@ bool isComment(std::string_view line) {
   return !line.empty() && (line.front() == '#' || line.front() == '%');
 }
 
-/// The lines before the first event.
+/// Facts about the lines before the first event.
 struct Header {
-  bool named = false;               // it names the columns
-  std::string_view not_understood;  // a line of words
+  bool named = false;               // a line names the columns
+  std::string_view not_understood;  // a line of unknown words
 };
 
-/// Takes order and unit from a line of names; leaves both where it names no event.
-/// @return whether it does.
+/// Takes order and unit from a line of names. Keeps both if the line does not name all columns.
+/// @return whether the line names all columns.
 bool takeNames(std::string_view line, EventColumns& columns) {
   if (isComment(line)) line = trimmed(line.substr(1));
   std::string order;
@@ -97,7 +97,6 @@ std::string_view takeHeader(std::string_view text, EventColumns& columns, Header
 
 std::string asWords(const std::string& order) { return fmt::format("{}", fmt::join(order, " ")); }
 
-/// The fields of some lines.
 using TextRows = std::vector<std::vector<std::string_view>>;
 
 std::optional<double> numberOf(std::string_view text) {
@@ -105,7 +104,7 @@ std::optional<double> numberOf(std::string_view text) {
   return polarityOf(text);
 }
 
-/// The numbers of the lines that have no other fields.
+/// Returns the numbers of the lines in which all fields are numbers.
 EventRows numbersOf(const TextRows& lines) {
   EventRows rows;
   for (const std::vector<std::string_view>& line : lines) {
@@ -119,7 +118,7 @@ EventRows numbersOf(const TextRows& lines) {
   return rows;
 }
 
-/// Says that a header is not understood, where its columns are as many as those of the lines.
+/// Warns of a header that is not understood, if the lines have the expected number of columns.
 void warnOfHeader(const TextRows& rows, const Header& header, const std::string& file,
                   EventColumns& columns) {
   if (header.not_understood.empty() || rows.empty() ||
@@ -150,7 +149,7 @@ struct FirstEvent {
   std::uint64_t line = 0;
   std::string_view text;
   std::vector<std::string_view> fields;
-  std::string order;  // of a header, else the usual one
+  std::string order;  // the header's order, else the usual order
 };
 
 std::optional<FirstEvent> firstEventOf(std::string_view beginning) {
@@ -168,7 +167,7 @@ std::optional<FirstEvent> firstEventOf(std::string_view beginning) {
   return first;
 }
 
-/// Whether the numbers between blanks or semicolons are such with a comma for a point.
+/// Returns whether the numbers between blanks or semicolons have decimal commas.
 bool hasDecimalCommas(std::string_view line) {
   const std::vector<std::string_view> fields = splitWords(line, " \t;");
   bool any = false;
@@ -346,12 +345,12 @@ namespace {
 
 constexpr std::size_t kColumns = kEventColumns.size();
 
-/// The values of a column.
+/// Statistics of a column's values.
 struct ColumnValues {
   bool whole = true;
   double min = std::numeric_limits<double>::infinity();
   double max = -min;
-  double max_drop = 0;  // below an earlier value
+  double max_drop = 0;  // largest difference to an earlier, larger value
   bool has_zero = false;
   bool has_one = false;
   bool has_minus_one = false;
@@ -367,7 +366,7 @@ struct ColumnValues {
     has_minus_one |= value == -1;
     has_others |= value != 0 && value != 1 && value != -1;
   }
-  /// A time comes late now and then. Pixels come and go over the whole image.
+  /// True for times, of which some may be late. Pixels rise and fall over the whole image.
   bool rises() const { return max > min && max_drop <= 0.1 * (max - min); }
   bool mayBeTime() const { return rises() || max == min || !whole; }
   bool mayBePolarity() const { return whole && !has_others && !(has_zero && has_minus_one); }
@@ -377,7 +376,7 @@ struct ColumnValues {
 
 using AllValues = std::array<ColumnValues, kColumns>;
 
-/// @return the number of rows.
+/// @return the number of rows that have four numbers.
 std::size_t addRows(const EventRows& rows, AllValues& columns) {
   std::size_t count = 0;
   for (const std::vector<double>& row : rows) {
@@ -388,7 +387,7 @@ std::size_t addRows(const EventRows& rows, AllValues& columns) {
   return count;
 }
 
-/// @param strict whether the time must rise, and the pixels must differ.
+/// @param strict true if times must rise and pixels must differ.
 bool isPossible(const AllValues& columns, const std::string& order, bool strict) {
   for (std::size_t k = 0; k < kColumns; ++k) {
     const ColumnValues& values = columns[k];
@@ -413,8 +412,8 @@ std::vector<std::string> allOrders() {
 }  // namespace
 
 std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::string& expected) {
-  constexpr std::size_t kFew = 10;    // say nothing
-  constexpr std::size_t kMany = 100;  // leave no doubt
+  constexpr std::size_t kFew = 10;    // fewer rows prove nothing
+  constexpr std::size_t kMany = 100;  // this number of rows proves the order
   AllValues columns;
   const std::size_t count = addRows(rows, columns);
   if (count < kFew) return std::nullopt;

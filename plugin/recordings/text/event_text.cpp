@@ -24,11 +24,11 @@ bool isDigit(char c) { return c >= '0' && c <= '9'; }
 bool isBlank(char c) { return c == ' ' || c == '\t'; }
 
 struct Digits {
-  std::uint64_t value;  // of at most 19 digits; wrapped beyond
+  std::uint64_t value;  // exact up to 19 digits, then it wraps
   std::ptrdiff_t count;
 };
 
-/// Reads digits and moves `text` behind them.
+/// Reads digits and moves `text` past them.
 Digits takeDigits(const char*& text) {
   const char* const begin = text;
   std::uint64_t value = 0;
@@ -36,14 +36,14 @@ Digits takeDigits(const char*& text) {
   return {value, text - begin};
 }
 
-/// Moves `text` behind blanks. @return whether there were any.
+/// Moves `text` past blanks. @return whether there were any.
 bool takeBlanks(const char*& text) {
   const bool any = isBlank(*text);
   while (isBlank(*text)) ++text;
   return any;
 }
 
-/// Moves `text` behind a separator and the blanks around it. @return whether there was one.
+/// Moves `text` past a separator and the blanks around it. @return whether there was one.
 bool takeSeparator(const char*& text, char separator) {
   const bool any = takeBlanks(text);
   if (separator == ' ') return any;
@@ -53,7 +53,7 @@ bool takeSeparator(const char*& text, char separator) {
   return true;
 }
 
-/// @param decimals_of_ns 9 where times count seconds, 0 where they count nanoseconds.
+/// @param decimals_of_ns decimals of a time to 1 ns: 9 for seconds, 0 for nanoseconds.
 /// @return false if `parseLine` must parse the line.
 inline bool takeTime(const char*& text, int decimals_of_ns, Event& event) {
   constexpr std::array<std::uint64_t, 10> kPowers = {
@@ -72,7 +72,7 @@ inline bool takeTime(const char*& text, int decimals_of_ns, Event& event) {
   return true;
 }
 
-/// Moves `text` behind a point and zeros: 96.0 is a pixel.
+/// Moves `text` past a point and zeros: 96.0 is a pixel.
 inline void takeZeroDecimals(const char*& text) {
   if (*text != '.') return;
   do {
@@ -110,7 +110,7 @@ bool takeIgnored(const char*& text, char separator) {
   return text != begin;
 }
 
-/// The whole lines at the beginning of a text.
+/// Returns the complete lines at the beginning of a text.
 std::string_view wholeLines(std::string_view text, bool ended) {
   return ended ? text : text.substr(0, text.rfind('\n') + 1);
 }
@@ -190,7 +190,7 @@ void EventTextStream::takeLine(std::string_view line, bool unterminated,
   lines_.emplace_back(events.size(), line_ + 1);
 }
 
-/// The fast path for a plain line. Each step stops at the newline at the latest.
+/// Parses a plain line fast. Each step stops at the newline at the latest.
 /// @return the next line; null if `parseLine` must parse this line.
 const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
   if (usual_) {
@@ -264,8 +264,8 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   return event;
 }
 
-/// The first event of the lines that begin after a byte: the byte of its line, and its time.
-/// Nothing if the next bytes have none.
+/// Finds the first event in the lines that begin after a byte. @return the byte of its line and its
+/// time; std::nullopt if the next bytes have no event.
 std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEventAfter(
     std::uint64_t byte) {
   std::array<char, 4096> bytes{};
@@ -283,7 +283,7 @@ std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEven
       const auto parsed = parseLine(text.substr(begin, newline - begin), false);
       if (parsed) return std::pair(byte + begin, parsed->t_ns);
     } catch (const std::runtime_error&) {
-      return std::nullopt;  // `read` reports it where it comes to it
+      return std::nullopt;  // `read` reports the error when it gets there
     }
     begin = newline;
   }
@@ -292,8 +292,8 @@ std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEven
 
 void EventTextStream::seek(std::int64_t t_ns) {
   constexpr std::uint64_t kCloseBytes = std::uint64_t{1} << 16;
-  // An event that is more than 10 ms older than another one before it is an error: no event of t_ns
-  // or later is before one that is 10 ms older.
+  // An event that is over 10 ms older than an earlier event of the file is an error. So no event of
+  // t_ns or later is before an event that is older than before_ns.
   const std::int64_t before_ns = t_ns - kMaxEventDelayNs;
   std::uint64_t low = 0;
   std::uint64_t high = content_.seekableBytes();

@@ -16,21 +16,22 @@
 
 namespace efm {
 
-/// Events from text, also compressed, with a line per event: t x y p, or other columns
-/// (`findEventColumns`); exact decimal times, pixel (also as 96.0), polarity (`polarityOf`). Blank
-/// lines, text after a `#`, repeated blanks, tabs, CRLF and a byte order mark are ignored.
+/// Reads events from text, also compressed, with a line per event: t x y p, or other columns
+/// (`findEventColumns`). Times are exact, pixels may be written as 96.0, polarities as in
+/// `polarityOf`. Blank lines, text after a `#`, repeated blanks, tabs, CRLF and a byte order mark
+/// are ignored.
 class EventTextStream : public EventStream {
  public:
   explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {});
 
   bool read(std::vector<Event>& events) override;
   void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
-  /// By bisection, to 64 KiB. A compressed file stays at its beginning.
+  /// Finds the time by bisection, to 64 KiB. A compressed file stays at its beginning.
   void seek(std::int64_t t_ns) override;
   std::string positionOf(std::size_t index) const override;
   std::string name() const override { return content_.file().string(); }
   double progress() const override { return started_ ? content_.progress() : 0; }
-  /// Of a first line `width height`, or `setSize`.
+  /// The size in a first line `width height`, or of `setSize`.
   std::optional<CameraSize> size() const override { return columns_.size; }
   std::vector<Warning> warnings() const override { return columns_.warnings; }
   void setSize(const CameraSize& size) { columns_.size = size; }
@@ -51,27 +52,27 @@ class EventTextStream : public EventStream {
   bool ended_ = false;
 
   std::vector<char> block_;       // text
-  std::size_t carried_ = 0;       // bytes of an incomplete line at its beginning
-  std::uint64_t first_byte_ = 0;  // of the first line, which is line 1
+  std::size_t carried_ = 0;       // bytes of an incomplete line at block_'s beginning
+  std::uint64_t first_byte_ = 0;  // position of line 1
   std::uint64_t line_ = 0;        // number of the current line
-  /// The line of an event of the last block, where it is not the line after that of the event
-  /// before.
+  /// The index and line of each event of the last block that is not on the line after the event
+  /// before it.
   std::vector<std::pair<std::size_t, std::uint64_t>> lines_;
 };
 
-/// Whether a file, which may be compressed, has lines of events, in the columns that the option
-/// names. Never throws.
+/// Returns whether a file, also a compressed one, has lines of events in the columns that the
+/// option names. Never throws.
 bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options = {});
 
-/// The whole lines at the beginning of a text, which may be compressed.
+/// Returns the complete lines at the beginning of a text, also of a compressed one.
 std::string beginningOfText(const std::filesystem::path& file);
 
-/// A camera per file.
+/// Opens text files, one camera per file.
 RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
                              const ReaderOptions& options);
 
-/// The file of events in a folder: events.txt, .csv, .txt.gz, .csv.gz or .zip, the first that is
-/// there; else events.txt.
+/// Returns the file of events in a folder: the first existing one of events.txt, .csv, .txt.gz,
+/// .csv.gz and .zip, else events.txt.
 std::filesystem::path eventFileIn(const std::filesystem::path& folder);
 
 }  // namespace efm

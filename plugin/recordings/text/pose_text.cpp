@@ -21,7 +21,7 @@ constexpr std::size_t kPoseFields = 8;  // t tx ty tz qx qy qz qw
 constexpr std::array<const char*, kPoseFields> kPoseFieldNames = {"t",  "tx", "ty", "tz",
                                                                   "qx", "qy", "qz", "qw"};
 
-/// The fields of a line: commas or semicolons separate them if there are any, else blanks.
+/// Splits a line into fields: at commas or semicolons if it has any, else at blanks.
 std::vector<std::string_view> poseFields(std::string_view line) {
   if (line.find_first_of(",;") == std::string_view::npos) return splitWords(line);
   return splitFields(line, ",;");
@@ -32,7 +32,7 @@ bool startsWithAny(std::string_view text, std::initializer_list<std::string_view
                      [&](std::string_view start) { return text.substr(0, start.size()) == start; });
 }
 
-/// The field of t tx ty tz qx qy qz qw that a header's word names.
+/// Returns the index in t tx ty tz qx qy qz qw of the field that a header's word names.
 std::optional<std::size_t> poseFieldOf(const HeaderWord& word) {
   if (word.isTime()) return 0;
   if (word.name.empty()) return std::nullopt;
@@ -46,15 +46,15 @@ std::optional<std::size_t> poseFieldOf(const HeaderWord& word) {
   return position && axis < 3 ? std::optional(1 + axis) : std::nullopt;
 }
 
-/// Where the fields of a pose stand in a line.
+/// The positions of a pose's fields in a line.
 struct PoseColumns {
   std::array<std::size_t, kPoseFields> column = {0, 1, 2, 3, 4, 5, 6, 7};
-  std::size_t count = kPoseFields;  // of a line
+  std::size_t count = kPoseFields;  // number of fields in a line
   bool named = false;
   std::optional<int> time_exponent;
-  Eigen::Vector3d metres = Eigen::Vector3d::Ones();  // in the unit of tx, ty and tz
+  Eigen::Vector3d metres = Eigen::Vector3d::Ones();  // in one unit of tx, ty and tz
 
-  /// Takes the unit that a header gives to a field; rotations have none.
+  /// Takes the unit that a header gives to a field; rotations have no unit.
   /// @throws std::runtime_error for an unknown unit of a position.
   void setUnit(std::size_t field, const HeaderWord& word) {
     if (field == 0) time_exponent = word.time_exponent;
@@ -68,10 +68,10 @@ struct PoseColumns {
   }
 };
 
-/// The columns that a header names; nothing where the line is no header.
+/// Returns the columns that a header names; std::nullopt if the line is no header.
 std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
   std::vector<std::string_view> words = poseFields(line);
-  // "# timestamp …": the mark is no column. "t [us]" with blanks: the unit is none, either.
+  // "# timestamp …": the # is no column. "t [us]" with a blank: the unit is no column, either.
   if (!words.empty() && words.front() == "#") words.erase(words.begin());
   PoseColumns columns;
   columns.named = true;
@@ -145,7 +145,7 @@ std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
   return lines;
 }
 
-/// @param columns of the lines, with the unit of the header.
+/// Finds the exponent of the unit of times. @param columns may have the unit of the header.
 int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
                const std::filesystem::path& file, const ReaderOptions& options) {
   if (columns.time_exponent) return *columns.time_exponent;
@@ -163,7 +163,7 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
       sample.add(*value, t.find_first_of(".eE") == std::string_view::npos);
     }
   }
-  if (!sample.whole) return 0;  // the option is that of the events
+  if (!sample.whole) return 0;  // the option is for times of events
   if (columns.named && file.filename().string().find("mocap_data") != std::string::npos) return -6;
   return poseTimeExponent(options, sample, file.string());
 }
@@ -210,7 +210,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
 
 bool looksLikePoseLines(std::string_view beginning) {
   ReaderOptions options;
-  options.time_unit = "ns";  // any: the values say nothing of it
+  options.time_unit = "ns";  // any unit: it does not matter here
   try {
     return !posesOf(beginning, {}, options).empty();
   } catch (const std::runtime_error&) {

@@ -10,7 +10,7 @@
 
 namespace efm {
 
-/// What is said of a line of 12 numbers: KITTI's poses are the first three rows of a matrix.
+/// The error for a line of 12 numbers: KITTI's poses are the first three rows of a matrix.
 inline constexpr const char* kPosesWithoutTimes =
     "12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or "
     "a "
@@ -20,17 +20,17 @@ inline constexpr const char* kPosesWithoutTimes =
 ///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;
 ///   columns in any order      if a header names them: EuRoC's CSV (#timestamp [ns], p_RS_R_x [m],
 ///                             …, q_RS_w [], …), TUM-VIE's mocap_data.txt (microseconds).
-/// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. Whole
-/// numbers without a unit in the header have that of the option, see `findTimeUnit`.
+/// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. If the
+/// header has no unit, whole numbers have the unit of the option: see `findTimeUnit`.
 /// @return the poses in the order of the file; there may be none.
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
                                       const ReaderOptions& options);
 
-/// Whether the whole lines at the beginning of a file are poses.
+/// Returns whether the complete lines at the beginning of a file are poses.
 bool looksLikePoseLines(std::string_view beginning);
 
-/// @return the poses.
-/// @throws std::runtime_error if there is none.
+/// Returns the poses.
+/// @throws std::runtime_error if there are none.
 std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
                                       const std::filesystem::path& file);
 
