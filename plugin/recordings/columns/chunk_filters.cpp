@@ -45,8 +45,8 @@ bool expandBlosc(const Bytes& in, Bytes& out) {
   return blosc_decompress_ctx(in.data(), out.data(), out.size(), 1) == static_cast<int>(out.size());
 }
 
-/// The bytes of the numbers stand plane by plane: all first bytes, all second bytes, …; what is
-/// not a whole number stands at the end.
+/// Restores numbers that are stored plane by plane: all first bytes, all second bytes, …. Bytes
+/// that are not a complete number are at the end.
 void unshuffle(std::size_t element_bytes, const Bytes& in, Bytes& out) {
   const std::size_t count = in.size() / element_bytes;
   for (std::size_t k = 0; k < element_bytes; ++k) {

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// An array of a file that is no archive, or of an archive.
+/// An array in an archive, or in a file of its own.
 struct FoundArray {
   std::string member;  // with ".npy"; empty: the file itself
   NpyHeader header;
@@ -38,13 +38,13 @@ bool isMatrix(const NpyHeader& header) {
   return !header.structured && shape.size() == 2 && shape[0] > 0 && shape[1] > 0;
 }
 
-/// Whether each number of an event stands in a row of its own.
+/// Returns whether a matrix has a row per column of the events, not a row per event.
 bool isLying(const std::vector<std::uint64_t>& shape, std::size_t columns) {
   return shape[1] != columns && shape[0] == columns;
 }
 
-/// Whether the array has the numbers of all events.
-/// @param columns of an event, as the option says: 4 or more, or 0 where they have names.
+/// Returns whether the array has all numbers of all events.
+/// @param columns number of columns in the option: 4 or more, or 0 if the columns have names.
 bool hasEvents(const NpyHeader& header, std::size_t columns) {
   if (header.structured) return !header.fields.empty();
   return isMatrix(header) && (header.shape[1] == columns || isLying(header.shape, columns));
@@ -57,7 +57,7 @@ bool hasPoses(const NpyHeader& header) {
   return shape.size() == 2 && (shape[1] == 7 || shape[1] == 8);
 }
 
-/// The columns of an event in `--event-columns`: its letters, or 0 for names. Without it 4.
+/// Returns the number of letters in `--event-columns`, 0 for names, 4 without the option.
 std::size_t columnsOf(const ReaderOptions& options) {
   if (options.columns.find('=') != std::string::npos) return 0;
   const auto letters = std::count_if(options.columns.begin(), options.columns.end(),
@@ -65,9 +65,9 @@ std::size_t columnsOf(const ReaderOptions& options) {
   return std::max<std::size_t>(4, static_cast<std::size_t>(letters));
 }
 
-/// The names that mean t, x, y and p: those of the option, or the only ones that mean it by
-/// themselves.
-/// @return nothing where one is missing, or two mean the same.
+/// Returns the names of t, x, y and p: the names in the option, else the only known name of each
+/// column.
+/// @return std::nullopt if a column is missing, or two names mean the same column.
 std::optional<EventNames> namesOf(const std::vector<std::string>& all,
                                   const ReaderOptions& options) {
   const auto has = [&](const std::string& name) {
@@ -86,7 +86,7 @@ std::optional<EventNames> namesOf(const std::vector<std::string>& all,
   return hasAll(names) ? std::optional(names) : std::nullopt;
 }
 
-/// The position of a name among all.
+/// Returns the index of a name in `all`.
 std::size_t indexOf(const std::string& name, const std::vector<std::string>& all) {
   return static_cast<std::size_t>(std::find(all.begin(), all.end(), name) - all.begin());
 }
@@ -113,7 +113,7 @@ std::size_t indexOf(const std::string& name, const std::vector<std::string>& all
       file.string(), all.empty() ? "no arrays" : all, given));
 }
 
-/// Whether it is the type of Metavision's events, whose times are microseconds.
+/// Returns whether the fields are those of Metavision, whose times are in microseconds.
 bool isMetavision(const std::vector<NpyField>& fields) {
   constexpr struct {
     const char* name;
@@ -128,8 +128,8 @@ bool isMetavision(const std::vector<NpyField>& fields) {
                     });
 }
 
-/// The columns with these names; the name of t may say its unit.
-/// @param column gives the column of a name.
+/// Returns the columns with these names. The name of t may include its unit.
+/// @param column function that returns the column of a name.
 template <typename ColumnNamed>
 EventTable tableOf(const EventNames& names, const ColumnNamed& column) {
   EventTable table;
@@ -139,7 +139,7 @@ EventTable tableOf(const EventNames& names, const ColumnNamed& column) {
   return table;
 }
 
-/// The columns of a structured array.
+/// Returns the columns of a structured array.
 EventTable fieldsOf(const fs::path& file, const FoundArray& found, const ReaderOptions& options) {
   std::vector<std::string> all;
   for (const NpyField& field : found.header.fields) all.push_back(field.name);
@@ -153,12 +153,12 @@ EventTable fieldsOf(const fs::path& file, const FoundArray& found, const ReaderO
   return table;
 }
 
-/// The columns of N x 4 or 4 x N numbers.
+/// Returns the columns of N x 4 or 4 x N numbers.
 EventTable matrixColumnsOf(const fs::path& file, const FoundArray& found,
                            const ReaderOptions& options) {
   const std::size_t count = columnsOf(options);
   const bool lying = isLying(found.header.shape, count);
-  // Rows one after the other: of N x 4 in C order, or of 4 x N in Fortran order. Else columns.
+  // True if the file stores event after event: N x 4 in C order, or 4 x N in Fortran order.
   const bool by_rows = lying == found.header.fortran_order;
   std::shared_ptr<NpyArray> array;
   std::vector<RowColumn> all;
@@ -177,7 +177,7 @@ EventTable matrixColumnsOf(const fs::path& file, const FoundArray& found,
   return table;
 }
 
-/// The columns of an array each; nothing where the archive has not all of them.
+/// Returns columns that are one array each; std::nullopt if the archive does not have all four.
 std::optional<EventTable> separateColumnsOf(const fs::path& file,
                                             const std::vector<FoundArray>& arrays,
                                             const ReaderOptions& options) {

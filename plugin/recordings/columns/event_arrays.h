@@ -10,38 +10,38 @@
 
 namespace efm {
 
-/// The events of a camera in columns of NumPy arrays. Polarity is 0 or 1, or -1 or 1. Arrays that
-/// are not compressed are sought by bisection.
-/// @param table t, x, y and p.
-/// @throws std::runtime_error naming the array of other length than t, or whose unit of time is
-/// not certain.
+/// Opens the events of a camera in columns of NumPy arrays. Polarity is 0 or 1, or -1 or 1. If the
+/// arrays are not compressed, `seek` uses bisection.
+/// @param table columns t, x, y and p.
+/// @throws std::runtime_error naming an array whose length differs from t's, or whose unit of time
+/// is not certain.
 std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptions& options);
 
 /// Events in NumPy arrays, a file per camera:
-///   .npy    N x 4 or 4 x N numbers, whose order is found from the values as that of text;
+///   .npy    N x 4 or 4 x N numbers, whose order is found from the values, as for text;
 ///           or a structured array with the fields t, x, y and p; Metavision's is in microseconds
 ///   .npz    t, x, y and p, an array of N numbers each; or one array as in a .npy file
-/// Fields and arrays are known by the names that columns of text have (xs, timestamps_us, polarity
-/// …), or by those that `--event-columns "t=NAME x=NAME y=NAME p=NAME"` gives; others are left out.
+/// Fields and arrays are found by the names that text columns have (xs, timestamps_us, polarity …),
+/// or by the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`. Others are ignored.
 
-/// Whether it is a NumPy array, also a compressed one, or an archive of arrays alone. Never throws.
+/// Returns whether a file is a NumPy array, also compressed, or an archive of arrays. Never throws.
 bool looksLikeNumpy(const std::filesystem::path& file);
 
-/// @throws std::runtime_error naming the file, what it has and what was expected.
+/// @throws std::runtime_error naming the file, its content and the expected content.
 RecordingParts openEventArrays(const std::vector<std::filesystem::path>& files,
                                const ReaderOptions& options);
 
 /// EVIMO2 v2 (Burner et al., 2022) as NumPy arrays, a folder per camera and sequence:
 ///   dataset_events_t.npy    N times in seconds, real
 ///   dataset_events_xy.npy   N x 2, pixel
-///   dataset_events_p.npy    N polarities, 0 or 1; the Samsung camera's are the other way around
+///   dataset_events_p.npy    N polarities, 0 or 1; inverted for the Samsung camera
 ///   dataset_info.npz        K (3 x 3), D (k1 k2 p1 p2: radtan); `meta` is a pickled Python object
-///   dataset_depth.npz       optional: the size of its arrays is the sensor's, else 640x480
+///   dataset_depth.npz       optional: its arrays have the sensor's size; without it 640x480
 ///   poses.txt               optional, not part of the data set: T_world_cam, from `meta`
-/// Of several folders, each is a camera. They have no calibration together, because the data set
-/// has no transform between them outside of Python objects.
+/// Each of several folders is a camera. Several cameras have no common calibration, because the
+/// data set stores the transforms between them only in Python objects.
 
-/// Whether the folder has a dataset_events_t.npy.
+/// Returns whether the folder has a dataset_events_t.npy.
 bool looksLikeEvimo2(const std::filesystem::path& folder);
 
 /// @throws std::runtime_error naming the file that is missing or wrong.

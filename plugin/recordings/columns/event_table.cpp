@@ -36,9 +36,9 @@ class TableEvents : public EventStream {
     while (events.size() < kBlockEvents && next_ < count_) append(events);
     return !events.empty();
   }
-  /// An event that is too early proves that all events before it are too early, too, up to the
-  /// delay that the caller subtracts. So the index is believed where it holds, and bisection needs
-  /// no order of all events.
+  /// If an event is too early, all events before it are too early, too: the caller has subtracted
+  /// the largest delay of events. So the index is used if the event before it is too early, and
+  /// bisection works without a complete order of the events.
   void seek(std::int64_t t_ns) override {
     for (const char letter : order()) {
       if (!column(letter).rows->canSeek()) return;
@@ -47,10 +47,10 @@ class TableEvents : public EventStream {
     const auto is_early = [&](std::uint64_t event) {
       const std::optional<std::int64_t> event_ns = column('t').time(event, *table_.time_unit_ns);
       if (event_ns) return *event_ns + table_.offset_ns < t_ns;
-      if (table_.place.empty()) return false;  // `read` reports it
+      if (table_.place.empty()) return false;  // `read` reports the error
       throw std::runtime_error(placeOf(event, 't') + ": t: expected " + kExpectedTime);
     };
-    std::uint64_t begin = 0;  // the events before it are too early
+    std::uint64_t begin = 0;  // all events before it are too early
     std::uint64_t end = count_;
     if (const auto event = indexed(t_ns)) {
       if (*event == 0 || is_early(*event - 1)) {
@@ -78,7 +78,7 @@ class TableEvents : public EventStream {
   std::vector<Warning> warnings() const override { return table_.warnings; }
 
  private:
-  /// Of the wrong numbers of an event, the first one in this order is reported.
+  /// If an event has several wrong numbers, the first one in this order is reported.
   std::string_view order() const { return table_.place.empty() ? "tpxy" : "xytp"; }
   const RowColumn& column(char letter) const { return table_.columns[kEventColumns.find(letter)]; }
   std::string placeOf(std::uint64_t event, char letter) const {
@@ -95,7 +95,7 @@ class TableEvents : public EventStream {
     table_.time_unit_ns = nanosecondsPer(unit.exponent);
     if (unit.warning) table_.warnings.push_back(std::move(*unit.warning));
   }
-  /// Appends the events up to the next end of a block.
+  /// Appends the events up to the first end of a column's block.
   void append(std::vector<Event>& events) {
     constexpr std::uint64_t kMaxEvents = 131'072;
     std::uint64_t end = std::min(count_, next_ + kMaxEvents);
@@ -117,7 +117,7 @@ class TableEvents : public EventStream {
     }
     next_ = end;
   }
-  /// Sets a part of the events from a column.
+  /// Sets one field of the events from a column.
   /// @return the index of the first wrong number, else `count`.
   std::size_t setColumn(char letter, const Column& numbers, std::size_t count,
                         Event* events) const {
@@ -158,7 +158,7 @@ class TableEvents : public EventStream {
     return std::runtime_error(
         fmt::format("{}: {} = {}: expected {}", placeOf(event, letter), letter, value, expected));
   }
-  /// The first event of the millisecond that contains a time, as the file's index says.
+  /// Returns the first event of the millisecond that contains a time, from the file's index.
   std::optional<std::uint64_t> indexed(std::int64_t t_ns) const {
     if (!table_.index || table_.index->rows->size() == 0) return std::nullopt;
     const std::int64_t since_ns = std::max<std::int64_t>(0, t_ns - table_.offset_ns);
@@ -174,7 +174,7 @@ class TableEvents : public EventStream {
 
   EventTable table_;
   std::uint64_t count_;
-  std::uint64_t first_ = 0;  // event of the last block
+  std::uint64_t first_ = 0;  // first event of the last block
   std::uint64_t next_ = 0;
 };
 

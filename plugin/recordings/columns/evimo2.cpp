@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr CameraSize kEvimo2Size = {640, 480};
 
-/// The data set's layout is CAMERA/CATEGORY/SUBCATEGORY/SEQUENCE.
+/// Finds the camera in the path: the layout is CAMERA/CATEGORY/SUBCATEGORY/SEQUENCE.
 bool isSamsung(const fs::path& folder) {
   std::error_code ignored;
   const fs::path absolute = fs::absolute(folder, ignored);
@@ -25,7 +25,7 @@ bool isSamsung(const fs::path& folder) {
                      [](const fs::path& part) { return part.string().rfind("samsung", 0) == 0; });
 }
 
-/// The size of the first array of dataset_depth.npz.
+/// Returns the size of the first array of dataset_depth.npz.
 std::optional<CameraSize> sizeOfDepth(const fs::path& folder) {
   const fs::path file = folder / "dataset_depth.npz";
   if (!isFile(file)) return std::nullopt;
@@ -52,7 +52,7 @@ std::vector<double> numbersOf(const fs::path& file, const char* member, std::siz
   return numbers;
 }
 
-/// The camera's model, without the sensor's size.
+/// Reads the camera's model, without the sensor's size.
 CameraModel modelOf(const fs::path& info) {
   const std::vector<double> k = numbersOf(info, "K.npy", 9);
   if (k.size() != 9) throw std::runtime_error(info.string() + "/K.npy: expected 3 x 3 numbers");

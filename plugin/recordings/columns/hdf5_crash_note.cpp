@@ -17,7 +17,7 @@ constexpr std::array<int, 5> kSignals = {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGAL
 
 bool is_enabled = false;
 bool has_note = false;
-// Of the note:
+// The state of the current note:
 pthread_t note_thread;
 std::string crash_sentence;
 std::string limit_sentence;
@@ -25,7 +25,7 @@ std::array<struct sigaction, kSignals.size()> earlier_actions;
 stack_t earlier_stack;
 alignas(16) std::array<char, 65'536> handler_stack;  // the library may have used up the thread's
 
-/// All calls are safe in a handler.
+/// Handles a signal. All calls are safe in a signal handler.
 void endWithSentence(int signal) {
   if (signal != SIGALRM && pthread_equal(pthread_self(), note_thread) == 0) {
     std::signal(signal, SIG_DFL);

@@ -14,7 +14,7 @@
 namespace efm {
 namespace {
 
-/// Texts of files are short: names of models and sizes.
+/// The maximum length of a text: names of models and sizes are short.
 constexpr std::size_t kMaxTextBytes = 4096;
 
 herr_t keepCause(unsigned position, const H5E_error2_t* error, void* cause) {
@@ -22,7 +22,7 @@ herr_t keepCause(unsigned position, const H5E_error2_t* error, void* cause) {
   return 0;
 }
 
-/// The text that `read` gives for a type in memory; nothing if it is not a text of one line.
+/// Returns the text that `read` gives for a type in memory; std::nullopt if it is no single text.
 template <typename Read>
 std::optional<std::string> readText(hid_t type, hid_t space, const Read& read) {
   if (H5Tget_class(type) != H5T_STRING || H5Sget_simple_extent_npoints(space) != 1) {
@@ -63,7 +63,7 @@ Hdf5File::Hdf5File(std::filesystem::path file) : path_(std::move(file)) {
   bytes_ = std::filesystem::file_size(path_, error);
   if (error) throw std::runtime_error(path_.string() + ": cannot be opened for reading");
   const Hdf5Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  // File systems of networks may have no locks, and a file that is only read needs none.
+  // Network file systems may have no locks, and a file that is only read needs no lock.
   H5Pset_file_locking(access.get(), false, true);
   id_ = Hdf5Id(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   if (!id_.valid()) {
@@ -105,7 +105,7 @@ std::int64_t Hdf5File::integer(const std::string& path) const {
   return value;
 }
 
-/// Reads a data set with this count of numbers; whole ones, if `type` is.
+/// Reads a data set of `count` numbers. If `type` is an integer type, they must be integers.
 /// @return whether it could be read.
 bool Hdf5File::readAll(const std::string& path, hid_t type, std::size_t count, void* to) const {
   const Hdf5Quiet quiet;
@@ -149,7 +149,7 @@ namespace {
 
 constexpr std::uint64_t kMaxRowBytes = 65'536;
 
-/// The product of the sides from `first` on; nothing above `max`.
+/// Returns the product of the sides from index `first` on; std::nullopt if it is above `max`.
 std::optional<std::uint64_t> productOf(const std::vector<hsize_t>& sides, std::size_t first,
                                        std::uint64_t max) {
   std::uint64_t product = 1;
@@ -160,8 +160,8 @@ std::optional<std::uint64_t> productOf(const std::vector<hsize_t>& sides, std::s
   return product;
 }
 
-/// Moves an index to the next one of a grid of rows whose last dimension runs fastest.
-/// @return false after the last one of its row.
+/// Advances an index within a row of a grid. The last dimension changes fastest.
+/// @return false after the last index of the row.
 bool advance(std::vector<hsize_t>& index, const std::vector<hsize_t>& ends,
              const std::vector<hsize_t>& steps) {
   for (std::size_t i = index.size(); i-- > 1;) {
@@ -249,7 +249,7 @@ RowBlock Hdf5Rows::readBlock(std::uint64_t row) {
   return {reinterpret_cast<const char*>(rows_.data()), first, first + rows};
 }
 
-/// The chunks of a range of rows: one, or several beside each other.
+/// Reads the chunks of a range of rows: one chunk, or several side by side.
 void Hdf5Rows::readChunks(std::uint64_t first_row) {
   std::vector<hsize_t> offset(sides_.size(), 0);
   offset[0] = first_row;
@@ -268,7 +268,7 @@ void Hdf5Rows::readChunk(const std::vector<hsize_t>& offset) {
   if (H5Dget_chunk_storage_size(set_.get(), offset.data(), &stored) < 0 || stored == 0) {
     throw failAt(offset[0], "the chunk is missing: expected a complete file");
   }
-  // A filter may enlarge what it cannot compress by some bytes.
+  // A filter may add some bytes to data that it cannot compress.
   const std::uint64_t max = std::min(file_->bytes(), 2 * chunk_bytes_ + 1024);
   if (stored > max) {
     throw failAt(offset[0], fmt::format("a chunk of {} bytes: expected at most {}", stored, max));
@@ -290,10 +290,10 @@ void Hdf5Rows::readChunk(const std::vector<hsize_t>& offset) {
   }
 }
 
-/// Copies the numbers of a chunk that holds a part of each row to their positions.
+/// Copies the numbers of a chunk, which holds a part of each row, to their positions.
 void Hdf5Rows::placeChunk(const std::vector<hsize_t>& offset) {
   rows_.resize(static_cast<std::size_t>(chunk_sides_[0]) * rowBytes());
-  std::vector<std::ptrdiff_t> positions;  // in the row, of each number in the chunk's rows; or -1
+  std::vector<std::ptrdiff_t> positions;  // byte in the set's row of each number; -1: outside
   std::vector<hsize_t> index(sides_.size(), 0);
   const std::vector<hsize_t> ones(sides_.size(), 1);
   do {
@@ -371,7 +371,7 @@ RowColumn Hdf5Rows::ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& f
   const Hdf5Id member_type(H5Tget_member_type(compound, member), H5Tclose);
   const NumberType type = rows->numberType(member_type.get());
   const std::size_t offset = H5Tget_member_offset(compound, member);
-  // The library does not compare them.
+  // The library does not check this.
   const std::size_t bytes = rows->rowBytes();
   if (offset > bytes || H5Tget_size(member_type.get()) > bytes - offset) {
     throw rows->fail(fmt::format("field {} at byte {}: expected a field inside a row of {} bytes",

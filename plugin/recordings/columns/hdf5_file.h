@@ -19,8 +19,8 @@
 
 namespace efm {
 
-/// Owns an identifier of the HDF5 library. The library is not thread-safe: one thread at a time
-/// calls it.
+/// Owns an identifier of the HDF5 library. The library is not thread-safe: only one thread at a
+/// time may call it.
 class Hdf5Id {
  public:
   using Close = herr_t (*)(hid_t);
@@ -45,7 +45,7 @@ class Hdf5Id {
   Close close_ = nullptr;
 };
 
-/// While it lives, the HDF5 library does not print its errors.
+/// While this object exists, the HDF5 library does not print its errors.
 class Hdf5Quiet {
  public:
   Hdf5Quiet() {
@@ -64,8 +64,8 @@ class Hdf5Quiet {
   void* data_ = nullptr;
 };
 
-/// The cause of the last failed call as the library words it, in parentheses and with a blank in
-/// front; empty if it has none.
+/// Returns the library's text for the cause of the last failed call, as " (CAUSE)"; empty if there
+/// is none.
 std::string hdf5Cause();
 
 /// An HDF5 file, open for reading. Paths of its objects begin with '/'.
@@ -80,19 +80,18 @@ class Hdf5File {
   bool has(const std::string& path) const;
   /// @throws std::runtime_error naming the file and the data set if there is no such data set.
   Hdf5Id dataset(const std::string& path) const;
-  /// All numbers of a small data set, row by row.
+  /// Reads all numbers of a small data set, row by row.
   /// @param count the expected number of numbers.
-  /// @throws std::runtime_error naming the file, the data set and `expected`, its meaning.
+  /// @throws std::runtime_error naming the file, the data set and `expected`, the numbers' meaning.
   std::vector<double> numbers(const std::string& path, std::size_t count,
                               std::string_view expected) const;
-  /// A whole number.
+  /// Reads a data set with one whole number.
   std::int64_t integer(const std::string& path) const;
-  /// The text of a data set.
   std::string text(const std::string& path) const;
-  /// The text of an attribute of the file, if it has this attribute.
+  /// Reads the text of an attribute of the file; std::nullopt if the file does not have it.
   std::optional<std::string> attribute(const char* name) const;
 
-  /// "FILE:PATH: …".
+  /// Makes the error "FILE:PATH: …".
   std::runtime_error fail(const std::string& path, std::string_view what) const;
 
  private:
@@ -103,27 +102,27 @@ class Hdf5File {
   std::uint64_t bytes_ = 0;
 };
 
-/// Reads a data set chunk by chunk. A row is the numbers, or the compound value, of one index of
-/// the first dimension, as the file stores them. Memory is that of a chunk. Known filters are
-/// undone here (see chunk_filters.h); others by the plugins of the HDF5 library.
+/// Reads a data set chunk by chunk. A row has the numbers, or the compound value, of one index of
+/// the first dimension, as stored in the file. Memory holds one chunk. Known filters are undone
+/// here (see chunk_filters.h), other filters by the plugins of the HDF5 library.
 class Hdf5Rows : public NumberRows {
  public:
-  /// @throws std::runtime_error naming the file and the data set if it does not exist, has no
-  /// layout that can be read, a filter that is absent, or larger chunks than `kMaxChunkBytes`.
+  /// @throws std::runtime_error naming the file and the data set if the data set does not exist,
+  /// its layout cannot be read, a filter is missing, or chunks are larger than `kMaxChunkBytes`.
   Hdf5Rows(std::shared_ptr<const Hdf5File> file, std::string path);
 
   static constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 27;
 
   const std::string& path() const { return path_; }
-  /// The numbers of a row: the product of the other dimensions.
+  /// The number of numbers in a row: the product of all dimensions but the first.
   std::size_t rowNumbers() const { return row_numbers_; }
   std::string placeOf(std::uint64_t row) const override;
   std::runtime_error fail(std::string_view what) const { return file_->fail(path_, what); }
 
-  /// A number of each row: of a list, or of a matrix.
-  /// @param index of the number in the row of a matrix.
+  /// Returns a column of a list or a matrix.
+  /// @param index index of the number in a row; 0 for a list.
   static RowColumn ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index);
-  /// A field of compound values.
+  /// Returns a field of compound values as a column.
   /// @throws std::runtime_error naming the file, the data set and the field if there is no such
   /// field, or it is no number.
   static RowColumn ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field);
@@ -143,14 +142,14 @@ class Hdf5Rows : public NumberRows {
   Hdf5Id set_;
   Hdf5Id type_;
   std::size_t element_bytes_ = 0;
-  std::vector<hsize_t> sides_;        // of the data set
-  std::vector<hsize_t> chunk_sides_;  // of a chunk, or of a block of rows
+  std::vector<hsize_t> sides_;        // size of each dimension of the data set
+  std::vector<hsize_t> chunk_sides_;  // size of a chunk, or of a block of rows
   std::uint64_t chunk_bytes_ = 0;
   std::size_t row_numbers_ = 1;
   bool direct_ = false;  // chunks are read without the library's filters
   std::vector<ChunkFilter> filters_;
 
-  std::vector<std::uint8_t> rows_;  // of the block
+  std::vector<std::uint8_t> rows_;  // bytes of the block
   std::vector<std::uint8_t> chunk_;
   std::vector<std::uint8_t> scratch_;
 };

@@ -27,7 +27,7 @@ bool isCamera(const std::string& name) {
   return name == "left" || name == "right" || name.rfind("cam", 0) == 0;
 }
 
-/// The camera of a file, by its path in the recording's folder.
+/// Returns the camera of a file, from its path in the recording's folder.
 std::string cameraOf(const fs::path& path) {
   for (const char* side : {"left", "right"}) {
     if (contains(path.string(), side)) return side;
@@ -36,7 +36,7 @@ std::string cameraOf(const fs::path& path) {
   return isCamera(folder) ? folder : "";
 }
 
-/// Adds the files of a folder and, `depth` deep, of the folders of events and cameras in it.
+/// Adds the files of a folder and, down to `depth` levels, of its folders of events and cameras.
 void addFiles(const fs::path& folder, int depth, std::vector<fs::path>& files) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;

@@ -31,24 +31,24 @@ namespace fs = std::filesystem;
 /// The order of the columns in the layouts, and in the rows of a matrix.
 constexpr std::string_view kHdf5Columns = "xytp";
 
-/// How a data set stores its events in HDF5. A new one is a row of `hdf5Layouts`.
-/// Polarity 1 is on; 0 and -1 are off.
+/// A layout of events in HDF5. A new layout is a row of `hdf5Layouts`. Polarity 1 is on; 0 and -1
+/// are off.
 struct Hdf5Layout {
-  std::string name;                  ///< Of the data sets that have it.
-  std::vector<std::string> cameras;  ///< Groups; those that exist, in this order.
-  /// The data set, in the group, whose rows are the events. Empty: a data set per column.
+  std::string name;                  ///< Names of the data sets with this layout.
+  std::vector<std::string> cameras;  ///< Groups in this order; not all need exist.
+  /// The data set in the group whose rows are the events. Empty: a data set per column.
   std::string events;
-  /// x, y, t and p: data sets in the group; the fields of compound rows; empty: the columns of a
-  /// matrix in this order.
+  /// The names of x, y, t and p: data sets in the group, or fields of compound rows. Empty: the
+  /// columns of a matrix in this order.
   std::array<std::string, 4> columns;
-  /// Of t. 0: it is not known. Real times have this unit only if it is seconds. An unknown unit is
-  /// found from the values (`findTimeUnit`).
+  /// Unit of t; 0: unknown. Floating-point times have this unit only if it is seconds. An unknown
+  /// unit is found from the values (`findTimeUnit`).
   std::int64_t time_unit_ns = 0;
-  std::string index{};   ///< In the group: the first event of each millisecond of t. Or empty.
-  std::string offset{};  ///< In the group: added to t, in units of `time_unit_ns`. Or empty.
-  std::optional<CameraSize> size{};  ///< Of the sensor, if all recordings have the same.
+  std::string index{};   ///< Data set: first event of each millisecond of t; empty: none.
+  std::string offset{};  ///< Data set: added to t, in units of `time_unit_ns`; empty: none.
+  std::optional<CameraSize> size{};  ///< Size of the sensor, if all recordings have it.
 
-  /// The data set by which a file with this layout is known.
+  /// Returns the data set that identifies a file with this layout.
   std::string signature() const { return events.empty() ? columns[0] : events; }
 };
 
@@ -84,10 +84,10 @@ const std::vector<Hdf5Layout>& hdf5Layouts() {
   return all;
 }
 
-/// The events of a camera. Real times are rounded to what they resolve (`nanoseconds`).
+/// Opens the events of a camera. Floating-point times are rounded, see `nanoseconds`.
 /// @param camera one of the layout's groups.
-/// @param size of the sensor, if it is known.
-/// @param options the unit of times that the layout does not know.
+/// @param size size of the sensor, if it is known.
+/// @param options unit of times, used if the layout has none.
 /// @throws std::runtime_error naming the file and the data set that is missing or wrong, or whose
 /// unit of time is not certain.
 std::unique_ptr<EventStream> openHdf5Events(const std::shared_ptr<const Hdf5File>& file,
@@ -137,7 +137,7 @@ struct Hdf5Poses {
   const char* matrices;
   const char* times;
   std::int64_t time_unit_ns;
-  bool inverse;  ///< The matrices are T_body_world.
+  bool inverse;  ///< True if the matrices are T_body_world.
 };
 
 constexpr Hdf5Poses kPoses[] = {
@@ -147,7 +147,7 @@ constexpr Hdf5Poses kPoses[] = {
 
 constexpr std::size_t kMatrixNumbers = 16;
 
-/// A transform from the rows of a 4x4 matrix; nothing if it is none.
+/// Returns the transform in the rows of a 4x4 matrix; std::nullopt if it is not rigid.
 std::optional<Rigid3> transformOf(const double* rows) {
   return transformNear(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows));
 }
@@ -186,7 +186,7 @@ std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
   return read;
 }
 
-/// M3ED's calibration of a camera.
+/// Reads M3ED's calibration of a camera.
 RigCamera readCalib(const Hdf5File& file, const std::string& group) {
   RigCamera camera;
   CameraModel& model = camera.model;
@@ -224,7 +224,7 @@ RigCamera readCalib(const Hdf5File& file, const std::string& group) {
   return camera;
 }
 
-/// Metavision's attribute.
+/// Reads the size from Metavision's attribute.
 std::optional<CameraSize> sizeOfAttribute(const Hdf5File& file) {
   const std::optional<std::string> text = file.attribute("geometry");
   return text ? cameraSizeOf(*text) : std::nullopt;
@@ -246,7 +246,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
     parts.cameras.push_back(openHdf5Events(file, layout, camera, size, options));
     ++count;
   }
-  // Without the first camera, T_rig_cam of the others has another rig.
+  // If the first camera is missing, T_rig_cam of the others refers to another rig.
   if (count > 0 && calibration.rig.cameras.size() == count && !parts.calibration &&
       isSame(calibration.rig.cameras.front().T_rig_cam, Rigid3())) {
     parts.calibration = std::move(calibration);
@@ -254,7 +254,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
   return count > 0;
 }
 
-/// The layout of the data sets, or of the fields of a compound data set, with given names.
+/// Makes the layout of data sets, or of fields of a compound data set, with given names.
 Hdf5Layout namedLayout(const Hdf5File& file, const EventNames& names) {
   Hdf5Layout layout = {"--event-columns", {""}, "", {}};
   for (std::size_t i = 0; i < layout.columns.size(); ++i) {
@@ -291,7 +291,7 @@ bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions&
   return any;
 }
 
-/// @return whether the file has events or poses.
+/// Adds a file. @return whether it has events or poses.
 bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts& parts) {
   constexpr unsigned kLimitS = 60;
   const Hdf5CrashNote note(path, kLimitS);
@@ -320,7 +320,7 @@ bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts&
 
 void addFolder(const fs::path& folder, const ReaderOptions& options, RecordingParts& parts) {
   bool any = false;
-  std::map<std::string, fs::path> files;  // with events, of each side
+  std::map<std::string, fs::path> files;  // the file with events of each side
   for (const auto& [side, file] : hdf5FilesIn(folder)) {
     const std::size_t cameras = parts.cameras.size();
     any = addFile(file, options, parts) || any;

@@ -84,7 +84,6 @@ void NpyArray::setColumns(const NpyPart& part) {
   row_bytes_ = columns_.size() * header_.element_bytes;
 }
 
-/// Skips bytes of the array.
 void NpyArray::skip(std::uint64_t bytes) {
   if (content_.seekableBytes() > 0) {
     content_.seek(header_.data_begin + bytes);
@@ -103,7 +102,7 @@ void NpyArray::skip(std::uint64_t bytes) {
   }
 }
 
-/// Rows behind a jump are few: it may be a step of a bisection.
+/// Reads few rows after a jump, which may be a step of a bisection.
 RowBlock NpyArray::readBlock(std::uint64_t row) {
   constexpr std::size_t kMaxRows = std::size_t{1} << 16;
   constexpr std::size_t kMaxBytes = std::size_t{1} << 23;

@@ -15,38 +15,38 @@
 
 namespace efm {
 
-/// What precedes the numbers of an array in a file of its own, or in a member of a .npz file.
+/// Reads the header of an array in a file of its own, or in a member of a .npz file.
 NpyHeader readNpyHeader(const std::filesystem::path& file, const std::string& member = {});
 
-/// Which numbers of an array are read.
+/// The part of an array that is read.
 struct NpyPart {
-  /// The fields of a structured array are its columns, as `NpyHeader::fields` has them.
+  /// True if the columns are the fields of a structured array (`NpyHeader::fields`).
   bool fields = false;
-  /// Of a matrix whose columns stand one after the other, this one: of N x 4 in Fortran order, or
-  /// of 4 x N in C order.
+  /// Index of the only column to read, if a matrix stores column after column: N x 4 in Fortran
+  /// order, or 4 x N in C order.
   std::optional<std::size_t> line;
-  /// A matrix in Fortran order is read as its transpose, whose rows stand one after the other.
+  /// True if a matrix in Fortran order is read as its transpose, which is stored row after row.
   bool transposed = false;
 };
 
-/// The numbers of a NumPy array in a file of its own (.npy) or a member of an archive (.npz), which
-/// is read from front to back. Memory is that of a block.
+/// The numbers of a NumPy array in a file of its own (.npy) or in a member of an archive (.npz). A
+/// member is read from front to back. Memory holds one block.
 class NpyArray : public NumberRows {
  public:
-  /// @param member of a .npz file, with its ".npy"; empty: the file is the array.
-  /// @param part without it, an array of numbers in C order is expected.
+  /// @param member name in a .npz file, with ".npy"; empty: the file is the array.
+  /// @param part default: all numbers of an array in C order.
   explicit NpyArray(const std::filesystem::path& file, const std::string& member = {},
                     const NpyPart& part = {});
 
   const NpyHeader& header() const { return header_; }
-  /// Numbers per row: the product of all sizes but the first one, or the number of fields.
+  /// Numbers per row: the product of all sizes but the first, or the number of fields.
   std::size_t columns() const { return columns_.size(); }
-  /// A column of an array; without such a column, which an empty array has not, any.
+  /// Returns a column of an array. An empty array has no columns: the result is then not used.
   static RowColumn columnOf(std::shared_ptr<NpyArray> array, std::size_t column);
 
   bool canSeek() const override { return content_.seekableBytes() > 0; }
   std::string placeOf(std::uint64_t row) const override;
-  /// "poses.npz/t.npy".
+  /// The name for errors: "poses.npz/t.npy".
   const std::string& name() const { return name_; }
 
  private:
@@ -59,8 +59,8 @@ class NpyArray : public NumberRows {
   NpyHeader header_;
   std::vector<NpyField> columns_;
   std::uint64_t begin_ = 0;  // byte of the first row
-  std::uint64_t next_ = 0;   // the row behind the last block
-  std::string ahead_;        // bytes read behind the header
+  std::uint64_t next_ = 0;   // the row after the last block
+  std::string ahead_;        // bytes read after the header
   std::vector<char> bytes_;  // of the block
 };
 
