@@ -34,30 +34,29 @@ struct Aedat4StreamInfo {
   std::optional<CameraSize> size;
 };
 
-/// The header of an AEDAT4 file.
 struct Aedat4Header {
   Aedat4Compression compression = Aedat4Compression::kNone;
   std::uint64_t packets_begin = 0;  ///< The byte of the first packet.
-  std::uint64_t packets_end = 0;    ///< The byte behind the last packet.
-  bool has_index = false;           ///< It is between `packets_end` and the end of the file.
+  std::uint64_t packets_end = 0;    ///< The byte after the last packet.
+  bool has_index = false;           ///< True if an index follows the packets.
   std::uint64_t file_size = 0;
-  std::vector<Aedat4StreamInfo> streams;  ///< With events (EVTS), in the order of their numbers.
+  std::vector<Aedat4StreamInfo> streams;  ///< Streams of events (EVTS), by their numbers.
 };
 
-/// Where a packet lies, as the index at the end of the file has it.
+/// The position of a packet, from the index at the end of the file.
 struct Aedat4IndexEntry {
-  std::uint64_t byte = 0;  ///< Of the packet's data, which follow 8 bytes of stream and size.
+  std::uint64_t byte = 0;  ///< Byte of the packet's data, after 8 bytes of stream and size.
   std::int32_t stream = 0;
   std::int64_t last_us = 0;  ///< The time of the last event.
 };
 
 constexpr std::size_t kMaxAedat4Bytes = std::size_t{1} << 28U;
 
-/// A table of a FlatBuffer. Its values may lie at any byte: writers in other languages than C++
-/// align them to another beginning. So each value is copied, at a position that is checked.
+/// A table of a FlatBuffer. Its values may be at any byte, because writers in other languages than
+/// C++ align them differently. So each value is copied from a checked position.
 class FlatTable {
  public:
-  /// The root of a FlatBuffer behind its size in 4 bytes. Refers to `bytes`.
+  /// Opens the root table of a FlatBuffer that follows its size (4 bytes). `bytes` must outlive it.
   FlatTable(const std::vector<std::uint8_t>& bytes, std::string_view identifier)
       : bytes_(bytes.data()), size_(bytes.size()) {
     constexpr std::uint64_t kSizeBytes = 4;
@@ -79,7 +78,7 @@ class FlatTable {
     const Elements characters = elements(field, 1);
     return textAt(characters.position, characters.count);
   }
-  /// Where the elements of a vector lie; none if the table has no such field.
+  /// The position and number of a vector's elements; none if the table has no such field.
   struct Elements {
     std::uint64_t position = 0;
     std::uint64_t count = 0;
@@ -92,7 +91,7 @@ class FlatTable {
     require(vector + sizeof(std::uint32_t), count * element_bytes);
     return {vector + sizeof(std::uint32_t), count};
   }
-  /// A table of a vector of tables.
+  /// Returns a table from a vector of tables.
   FlatTable element(const Elements& tables, std::uint64_t index) const {
     FlatTable table = *this;
     table.table_ = targetOf(tables.position + index * sizeof(std::uint32_t));
@@ -119,7 +118,7 @@ class FlatTable {
   std::uint64_t targetOf(std::uint64_t offset) const {
     return offset + valueAt<std::uint32_t>(offset);
   }
-  /// A list before or behind the table has the fields' positions: 0 or missing of absent ones.
+  /// Reads a field's position from a list near the table: absent fields have 0 or no entry.
   std::optional<std::uint64_t> positionOf(std::uint64_t field) const {
     const std::uint64_t list =
         table_ - static_cast<std::uint64_t>(std::int64_t{valueAt<std::int32_t>(table_)});
@@ -135,7 +134,7 @@ class FlatTable {
   std::uint64_t table_ = 0;
 };
 
-/// A child <node name="…"> or <attr key="…"> of a node; null if there is none.
+/// Returns a child <node name="…"> or <attr key="…"> of a node; null if there is none.
 const tinyxml2::XMLElement* xmlChild(const tinyxml2::XMLElement* node, const char* kind,
                                      const char* key, const char* value) {
   if (node == nullptr) return nullptr;
@@ -152,7 +151,7 @@ std::string xmlAttribute(const tinyxml2::XMLElement* node, const char* key) {
   return text == nullptr ? "" : text;
 }
 
-/// The streams of events that the header's XML lists.
+/// Returns the streams of events that the header's XML lists.
 std::vector<Aedat4StreamInfo> streamsOf(std::string_view xml) {
   tinyxml2::XMLDocument document;
   if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) {
@@ -182,8 +181,9 @@ std::vector<Aedat4StreamInfo> streamsOf(std::string_view xml) {
   return streams;
 }
 
-/// Grows `bytes` and calls `step(source, size, target, capacity)` until it says that the frame has
-/// ended. `step` moves the four values, and returns whether the frame goes on.
+/// Grows `bytes` and calls `step(source, taken, target, given)` until the frame ends. `step`
+/// replaces the sizes of both by the numbers of read and written bytes, and returns whether the
+/// frame goes on.
 template <typename Step>
 void growWhile(const std::vector<std::uint8_t>& packed, std::vector<std::uint8_t>& bytes,
                const Step& step) {
@@ -247,7 +247,7 @@ void decompressZstdFrame(const std::vector<std::uint8_t>& packed,
             });
 }
 
-/// @throws std::runtime_error naming the file, the position and what was expected.
+/// @throws std::runtime_error naming the file, the position and the expected value.
 Aedat4Header readAedat4Header(const std::filesystem::path& file) {
   const auto fail = [&](std::uint64_t byte, const std::string& what) {
     return std::runtime_error(fmt::format("{}: byte {}: {}", file.string(), byte, what));
@@ -298,7 +298,7 @@ Aedat4Header readAedat4Header(const std::filesystem::path& file) {
 }
 
 /// Decompresses a packet or the index.
-/// @param bytes is replaced by at most 256 MiB; memory grows with the bytes that there are.
+/// @param bytes replaced by the result, at most 256 MiB; memory grows with the existing data.
 /// @throws std::runtime_error, without the file's name, at damaged data.
 void decompressAedat4(Aedat4Compression compression, const std::vector<std::uint8_t>& packed,
                       std::vector<std::uint8_t>& bytes) {
@@ -317,8 +317,8 @@ void decompressAedat4(Aedat4Compression compression, const std::vector<std::uint
   }
 }
 
-/// The entries of the decompressed index.
-/// @throws std::runtime_error, without the file's name, where the bytes are not an index.
+/// Returns the entries of the decompressed index.
+/// @throws std::runtime_error, without the file's name, if the bytes are not an index.
 std::vector<Aedat4IndexEntry> indexOfAedat4(const std::vector<std::uint8_t>& bytes) {
   // table FileDataTable { table: [FileDataDefinition]; }
   // table FileDataDefinition { byteOffset: int64; packetInfo: PacketHeader; numElements: int64;
@@ -343,7 +343,7 @@ bool isAedat4Named(const Aedat4StreamInfo& stream, const std::string& name) {
   return name == stream.name || name == stream.source || name == std::to_string(stream.id);
 }
 
-/// The streams that `topics` names, in its order; all without topics.
+/// Returns the streams that `topics` names, in the order of the topics; all if it is empty.
 std::vector<Aedat4StreamInfo> chosenAedat4Streams(const std::filesystem::path& file,
                                                   const std::vector<Aedat4StreamInfo>& all,
                                                   const std::vector<std::string>& topics) {
@@ -402,8 +402,8 @@ class Aedat4Stream : public EventStream {
     }
     return true;
   }
-  /// By the index at the end of the file. An index that is absent (the recording was interrupted)
-  /// or does not fit the packets is not used.
+  /// Uses the index at the end of the file. If the index is absent (the recording was interrupted)
+  /// or does not fit the packets, it is not used.
   void seek(std::int64_t t_ns) override {
     if (!header_->has_index) return;
     const std::uint64_t size = header_->file_size - header_->packets_end;
@@ -482,10 +482,10 @@ class Aedat4Stream : public EventStream {
   std::shared_ptr<const Aedat4Header> header_;
   Aedat4StreamInfo info_;
   std::ifstream stream_;
-  std::uint64_t next_byte_ = 0;           // of the next packet
+  std::uint64_t next_byte_ = 0;           // position of the next packet
   std::uint64_t packet_byte_ = 0;         // of the current packet
   std::vector<std::uint8_t> packed_;      // of the current packet
-  std::vector<std::uint8_t> flatbuffer_;  // of the current packet, decompressed
+  std::vector<std::uint8_t> flatbuffer_;  // current packet, decompressed
 };
 
 }  // namespace

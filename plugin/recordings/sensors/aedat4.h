@@ -10,13 +10,13 @@
 
 namespace efm {
 
-/// What an AEDAT4 file begins with.
+/// The first bytes of an AEDAT4 file.
 inline constexpr std::string_view kAedat4Magic = "#!AER-DAT4.0\r\n";
 
-/// How the packets of an AEDAT4 file are compressed. The numbers are the file's.
+/// The compression of packets in an AEDAT4 file. The values are those in the file.
 enum class Aedat4Compression : std::int32_t { kNone, kLz4, kLz4High, kZstd, kZstdHigh };
 
-/// An event in a packet, as the file has it.
+/// An event in a packet, as stored in the file.
 struct Aedat4Event {
   std::int64_t t_us;  ///< Unix time.
   std::int16_t x;
@@ -26,13 +26,12 @@ struct Aedat4Event {
 };
 static_assert(sizeof(Aedat4Event) == 16);
 
-/// Whether a file begins like an AEDAT4 file.
 bool looksLikeAedat4(const std::filesystem::path& file);
 
-/// Each stream of events is a camera, in the order of the streams' numbers; of several files, in
-/// the order of the files. `options.topics` chooses among streams by the name of their output,
-/// their camera or their number; cameras are then in its order.
-/// @throws std::runtime_error naming the file, the position and what was expected; also where this
+/// Opens files. Each stream of events is a camera, in the order of the files and, within a file, of
+/// the streams' numbers. `options.topics` chooses streams by the name of their output, their camera
+/// or their number; the cameras are then in the order of the topics.
+/// @throws std::runtime_error naming the file, the position and the expected value; also if this
 /// build does not read AEDAT4.
 RecordingParts openAedat4(const std::vector<std::filesystem::path>& files,
                           const ReaderOptions& options);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kNsPerUs = 1000;
 
-/// The upper four bits of a word.
+/// The type of a word: its upper four bits.
 enum EvtType : unsigned {
   kOff = 0,
   kOn = 1,
@@ -29,7 +29,7 @@ unsigned typeOf(Word word) {
   return static_cast<unsigned>(word >> (8 * sizeof(Word) - 4));
 }
 
-/// Bits of a word, as a coordinate.
+/// Returns bits of a word as a coordinate.
 template <typename Word>
 std::uint16_t bitsOf(Word word, unsigned first, unsigned count) {
   return static_cast<std::uint16_t>((word >> first) & ((1U << count) - 1));
@@ -43,8 +43,9 @@ inline Event* putEvent(Event* at, std::uint64_t t_ns, unsigned x, std::uint16_t 
   return at + 1;
 }
 
-/// Writes an event for each set bit; bit i is the column x + i. Four at a time: a branch for each
-/// bit would often be predicted wrongly. Up to three events behind the last are overwritten.
+/// Writes an event for each set bit; bit i is the column x + i. It writes four at a time: a branch
+/// for each bit would often be predicted wrongly. Up to three events after the last one are
+/// overwritten.
 /// @return the end of the events.
 inline Event* putVector(Event* at, std::uint32_t bits, std::uint64_t t_ns, unsigned x,
                         std::uint16_t y, bool polarity) {
@@ -58,13 +59,13 @@ inline Event* putVector(Event* at, std::uint32_t bits, std::uint64_t t_ns, unsig
   return at;
 }
 
-/// The events' time and row are known.
+/// Returns whether the events' time and row are known.
 inline bool isComplete(const Evt2State& state) { return state.has_high; }
 inline bool isComplete(const Evt3State& state) {
   return state.has_high && state.has_low && state.has_y;
 }
 
-/// @param value of a TIME_HIGH, 28 bits.
+/// @param value value of a TIME_HIGH, 28 bits.
 inline void setHigh(Evt2State& state, std::uint32_t value) {
   constexpr std::uint64_t kRange = std::uint64_t{1} << 28U;
   const std::uint64_t step = (value - state.high) % kRange;
@@ -74,7 +75,7 @@ inline void setHigh(Evt2State& state, std::uint32_t value) {
   state.has_high = true;
 }
 
-/// @param value of a TIME_HIGH, 12 bits.
+/// @param value value of a TIME_HIGH, 12 bits.
 inline void setHigh(Evt3State& state, std::uint32_t value) {
   constexpr std::uint64_t kRange = std::uint64_t{1} << 12U;
   const bool first = !state.begun;
@@ -89,7 +90,7 @@ inline void setHigh(Evt3State& state, std::uint32_t value) {
   if (step != 0) state.t_ns = kNsPerUs * (kRange * state.high + state.low);
 }
 
-/// @param value of a TIME_LOW, 12 bits.
+/// @param value value of a TIME_LOW, 12 bits.
 inline void setLow(Evt3State& state, std::uint16_t value) {
   constexpr std::uint64_t kRange = std::uint64_t{1} << 12U;
   std::uint64_t time = kRange * state.high + value;
@@ -105,8 +106,8 @@ inline void setLow(Evt3State& state, std::uint16_t value) {
   state.has_low = state.has_high;
 }
 
-/// A word of an encoding, and what it does to the state. `step` writes its events to `at` and
-/// returns their end.
+/// The words of an encoding and their effect on the state. `step` writes the events of a word to
+/// `at` and returns their end.
 struct Evt2Code {
   using State = Evt2State;
   using Word = std::uint32_t;
@@ -199,7 +200,7 @@ struct Evt3Code {
   }
 };
 
-/// Room for the events of many words, and for those that a vector writes behind its last.
+/// Space for the events of many words, and for the events that a vector writes after its last one.
 constexpr std::size_t kScratchEvents = 4096;
 constexpr std::size_t kScanWords = 64;
 
@@ -218,7 +219,7 @@ void withCode(EvtEncoding encoding, const Call& call) {
   }
 }
 
-/// A word at any address. Hosts are little-endian, like the encodings.
+/// Reads a word at any address. Hosts are little-endian, like the encodings.
 template <typename Code>
 typename Code::Word wordAt(const std::uint8_t* data) {
   typename Code::Word word;
@@ -226,7 +227,7 @@ typename Code::Word wordAt(const std::uint8_t* data) {
   return Code::load(word);
 }
 
-/// Decodes `count` words, which give at most kScratchEvents. @return the end of the events.
+/// Decodes `count` words, which have at most kScratchEvents events. @return the end of the events.
 template <typename Code>
 Event* decodeWords(typename Code::State& kept, const std::uint8_t* data, std::size_t count,
                    Event* at) {
@@ -238,8 +239,8 @@ Event* decodeWords(typename Code::State& kept, const std::uint8_t* data, std::si
   return at;
 }
 
-/// Follows the TIME_HIGH words. Most groups of words have none, or only repeat the last one: the
-/// first loop, which the compiler vectorises, finds them.
+/// Follows the TIME_HIGH words. Most groups of words have no TIME_HIGH, or only repeat the last
+/// one: the first loop, which the compiler vectorises, finds these groups.
 template <typename Code>
 void scanWords(typename Code::State& state, const std::uint8_t* data, std::size_t count) {
   using Word = typename Code::Word;
@@ -292,7 +293,7 @@ void EvtDecoder::decode(const std::uint8_t* data, std::size_t size, std::vector<
     };
     takeCarried(kWord, data, size, decode_some);
     for (std::size_t words = size / kWord; words > 0;) {
-      // A word alone until the state is complete: a word changes the state or has events.
+      // One word at a time until the state is complete: a word changes the state or has events.
       const std::size_t count = evt::isComplete(state) ? std::min(words, kBatch) : 1;
       decode_some(data, count);
       data += count * kWord;
@@ -319,7 +320,7 @@ void EvtDecoder::scanTime(const std::uint8_t* data, std::size_t size) {
   if (auto* const state = std::get_if<Evt3State>(&state_)) state->has_low = state->has_y = false;
 }
 
-/// Completes the word that the last call had only in part, and moves behind its bytes.
+/// Completes the word that the last call had only in part, and skips its bytes.
 template <typename Use>
 void EvtDecoder::takeCarried(std::size_t word_size, const std::uint8_t*& data, std::size_t& size,
                              const Use& use) {

@@ -20,21 +20,21 @@
 namespace efm {
 namespace {
 
-/// What the lines "% key value" at the beginning of a RAW file say.
+/// The values in the lines "% key value" at the beginning of a RAW file.
 struct RawHeader {
   EvtEncoding encoding = EvtEncoding::kEvt3;  ///< "% evt 3.0" or "% format EVT3;…"
-  /// "% geometry 1280x720" or "% format …;height=720;…"; else of the camera that "% plugin_name" or
-  /// "% system_ID" names, as files of 2020 have it.
+  /// Size in "% geometry 1280x720" or "% format …;height=720;…"; else the size of the camera that
+  /// "% plugin_name" or "% system_ID" names, as in files of 2020.
   std::optional<CameraSize> size;
-  std::uint64_t bytes = 0;  ///< Of the header; the words follow.
+  std::uint64_t bytes = 0;  ///< Size of the header; the words follow.
 };
 
 constexpr std::size_t kRawBlockBytes = std::size_t{1} << 18U;  // whole words of every encoding
 constexpr std::size_t kMaxRawHeaderBytes = std::size_t{1} << 16U;
-/// The EVT 3.0 clock is at most two periods ahead of a TIME_HIGH, also if the next one is late.
+/// The EVT 3.0 clock is at most two periods ahead of a TIME_HIGH, even if the next one is late.
 constexpr std::int64_t kMaxAheadNs = 2 * 4'096'000;
 
-/// Cameras by the beginning of a value in the header: of a generation, or of one system.
+/// A camera that a value in the header names: by its beginning (a generation) or fully (a system).
 struct KnownCamera {
   std::string_view key;
   std::string_view value;
@@ -60,7 +60,6 @@ std::optional<CameraSize> sizeOfCamera(std::string_view key, std::string_view va
   return std::nullopt;
 }
 
-/// Parses the lines of a header one after the other.
 class RawHeaderParser {
  public:
   RawHeaderParser(const std::filesystem::path& file, std::string_view text)
@@ -92,7 +91,7 @@ class RawHeaderParser {
   }
 
  private:
-  /// A line of a header begins with "% " and is text; words of events that begin so are neither.
+  /// Takes the next line of the header: text after "% ". Event words with these bytes are no text.
   bool nextLine() {
     if (text_.substr(header_.bytes, 2) != "% ") return false;
     const std::size_t newline = text_.find('\n', header_.bytes);
@@ -105,7 +104,7 @@ class RawHeaderParser {
     return true;
   }
 
-  /// "EVT3;height=720;width=1280"
+  /// Takes a value like "EVT3;height=720;width=1280".
   void takeFormat(std::string_view value) {
     const std::vector<std::string_view> parts = splitWords(value, ";");
     takeEncoding("format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
@@ -139,7 +138,7 @@ class RawHeaderParser {
 
   void takeEncoding(std::string_view key, std::string_view value, const char* expected) {
     constexpr struct {
-      std::string_view version;  // "evt"
+      std::string_view version;  // value of "evt"
       std::string_view format;
       EvtEncoding encoding;
     } kEncodings[] = {{"2.0", "EVT2", EvtEncoding::kEvt2},
@@ -166,7 +165,7 @@ class RawHeaderParser {
   int number_ = 0;
   std::optional<EvtEncoding> encoding_;
   bool legacy_order_ = false;
-  std::optional<CameraSize> camera_size_;  // of a camera that the header names
+  std::optional<CameraSize> camera_size_;  // size of a camera that the header names
 };
 
 std::ifstream openRaw(const std::filesystem::path& file) {
@@ -212,11 +211,11 @@ class PropheseeRawStream : public EventStream {
     }
     return false;
   }
-  /// Reads the file up to the time, but only its TIME_HIGH words (some GB/s): in EVT 3.0 no other
-  /// way tells how often the clock wrapped.
+  /// Reads only the TIME_HIGH words up to the time (some GB/s): in EVT 3.0, nothing else shows how
+  /// often the clock wrapped.
   void seek(std::int64_t t_ns) override {
-    // `scan` reaches the time in the current block. Decoding starts a block earlier: what an event
-    // needs beside the TIME_HIGH words, its row for instance, comes from there.
+    // `scan` reaches the time in the current block. Decoding starts one block earlier, to find the
+    // other values of its events, for instance the row.
     EvtDecoder scan(header_.encoding);
     EvtDecoder at_last = scan;
     std::uint64_t last_byte = header_.bytes;
@@ -257,7 +256,7 @@ class PropheseeRawStream : public EventStream {
   }
 
  private:
-  /// Reads the block behind the current one. @return false at the end.
+  /// Reads the next block. @return false at the end.
   bool readBlock() {
     block_byte_ += block_.size();
     block_.resize(std::min<std::uint64_t>(kRawBlockBytes,
@@ -278,7 +277,7 @@ class PropheseeRawStream : public EventStream {
   RawHeader header_;
   EvtDecoder decoder_;
   bool from_beginning_ = true;
-  EvtDecoder at_block_;  // the decoder before the block
+  EvtDecoder at_block_;  // state of the decoder before the block
   std::vector<std::uint8_t> block_;
   std::uint64_t block_byte_ = 0;  // the position of the block in the file
 };

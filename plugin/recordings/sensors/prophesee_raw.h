@@ -8,10 +8,10 @@
 
 namespace efm {
 
-/// Whether a file begins with the header of a RAW file with EVT words.
+/// Returns whether a file begins with the header of a RAW file with EVT words.
 bool looksLikePropheseeRaw(const std::filesystem::path& file);
 
-/// Each file is a camera. Times are those of the sensor's clock, see EvtDecoder.
+/// Opens files, one camera per file. Times are those of the sensor's clock: see EvtDecoder.
 RecordingParts openPropheseeRaw(const std::vector<std::filesystem::path>& files,
                                 const ReaderOptions& options);
 
