@@ -14,7 +14,7 @@ namespace efm {
 namespace {
 
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
-constexpr std::size_t kRecentBytes = 8 << 20;  // of chunks that are kept
+constexpr std::size_t kRecentBytes = 8 << 20;  // size of the chunks that are kept
 
 /// @return the number of bytes in `target`.
 std::size_t decompressLz4(const std::uint8_t* data, std::size_t size, std::uint8_t* target,
@@ -86,7 +86,7 @@ ChunkBytes unpackChunk(ChunkCompression compression, ChunkBytes packed, std::uin
   }
   ChunkBytes bytes = std::move(packed);
   if (compression != ChunkCompression::kNone) {
-    // Without initial values: pages that nothing is written to take no memory.
+    // The memory has no initial values: pages that are not written take no memory.
     std::unique_ptr<std::uint8_t[]> memory(new std::uint8_t[std::max<std::uint64_t>(claimed, 1)]);
     try {
       bytes.size = decompressTo(compression, bytes.data, bytes.size, memory.get(), claimed);
@@ -112,7 +112,7 @@ ChunkedBag::ChunkedBag(std::filesystem::path file, std::string_view repair)
 
 /// Reads the chunks that have the topic, one after the other.
 BagCursor ChunkedBag::messages(std::size_t topic, std::int64_t from_log_ns) {
-  bool begun = false;  // there was a message
+  bool begun = false;  // true after the first message
   std::size_t next_chunk = 0;
   std::shared_ptr<const ChunkMessages> chunk;
   std::size_t next_message = 0;
@@ -149,7 +149,7 @@ void ChunkedBag::setChunks(std::vector<BagChunk> chunks) {
   if (first != nullptr) setLogTimes(first->first_log_ns, last->last_log_ns);
 }
 
-/// Cameras are read by turns, one some chunks before the other.
+/// Keeps recent chunks: cameras are read in turns, some chunks apart.
 std::shared_ptr<const ChunkMessages> ChunkedBag::chunkAt(std::size_t index) {
   const auto found = std::find_if(recent_.begin(), recent_.end(),
                                   [&](const auto& entry) { return entry.first == index; });

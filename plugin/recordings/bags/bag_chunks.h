@@ -18,23 +18,23 @@
 
 namespace efm {
 
-/// Where a chunk of messages lies in a bag.
+/// The position of a chunk of messages in a bag.
 struct BagChunk {
-  std::uint64_t offset = 0;  ///< Of the chunk's record in the file, in bytes.
-  std::uint64_t size = 0;    ///< Of the record. May reach beyond a damaged file.
+  std::uint64_t offset = 0;  ///< Position of the chunk's record in the file, in bytes.
+  std::uint64_t size = 0;    ///< Size of the record. It may exceed a damaged file.
   std::int64_t first_log_ns = 0;
   std::int64_t last_log_ns = 0;
-  /// `topicBit` of each topic that has messages in it.
+  /// The bits (`topicBit`) of the topics with messages in the chunk.
   std::uint64_t topics = ~std::uint64_t{0};
 };
 
-/// Topics from the 64th on share a bit.
+/// Returns the bit of a topic. Topics from the 64th on share a bit.
 inline std::uint64_t topicBit(std::size_t topic) {
   constexpr std::size_t kLastBit = 63;
   return std::uint64_t{1} << std::min(topic, kLastBit);
 }
 
-/// Bytes of a chunk, and the memory that they lie in.
+/// The bytes of a chunk and the memory that owns them.
 struct ChunkBytes {
   std::unique_ptr<std::uint8_t[]> memory;
   const std::uint8_t* data = nullptr;
@@ -51,25 +51,25 @@ struct ChunkMessages {
 };
 
 /// A bag whose file is a sequence of chunks, each compressed by itself: ROS 1 bags and MCAP. Memory
-/// holds the list of chunks, the last ones that were read (8 MiB) and one chunk for each cursor.
+/// holds the list of chunks, the last chunks that were read (8 MiB) and one chunk for each cursor.
 class ChunkedBag : public BagSource {
  public:
   BagCursor messages(std::size_t topic, std::int64_t from_log_ns) override;
 
  protected:
-  /// @param repair what damaged bags of this kind are repaired with, for errors; may be empty.
+  /// @param repair text for errors about the repair of damaged bags; may be empty.
   explicit ChunkedBag(std::filesystem::path file, std::string_view repair = {});
 
   virtual ChunkMessages readChunk(const BagChunk& chunk) = 0;
 
-  /// @throws std::runtime_error where the file ends earlier, before memory is allocated.
-  /// At most 1 GiB.
+  /// Reads at most 1 GiB. @throws std::runtime_error, before memory is allocated, if the file is
+  /// shorter.
   std::unique_ptr<std::uint8_t[]> readBytes(std::uint64_t offset, std::uint64_t size);
   std::uint64_t fileSize() const { return file_size_; }
   void setChunks(std::vector<BagChunk> chunks);
-  /// An error at a byte of the file: "a.bag: byte 4117: …".
+  /// Makes an error at a byte of the file: "a.bag: byte 4117: …".
   std::runtime_error errorAt(std::uint64_t offset, const std::string& what) const;
-  /// Calls `read`; its errors become those of a byte of the file.
+  /// Calls `read`, and adds the byte of the file to its errors.
   template <typename Read>
   auto located(std::uint64_t offset, const Read& read) const {
     try {
@@ -92,16 +92,14 @@ class ChunkedBag : public BagSource {
 
 enum class ChunkCompression { kNone, kBz2, kLz4, kZstd };
 
-/// @param known the names that the format has: "none" or "", "bz2", "lz4", "zstd".
-/// @throws std::runtime_error, without the file's name, where the name is not one of them.
+/// @param known the names that the format allows: "none" or "", "bz2", "lz4", "zstd".
+/// @throws std::runtime_error, without the file's name, if the name is not known.
 ChunkCompression chunkCompression(std::string_view name,
                                   std::initializer_list<std::string_view> known);
 
-/// Decompresses a chunk.
-/// @param claimed its size when decompressed, at most 1 GiB. Memory is used only as far as there
-/// are bytes for it.
+/// @param claimed size when decompressed, at most 1 GiB. Memory is used only for bytes that exist.
 /// @return `claimed` bytes.
-/// @throws std::runtime_error, without the file's name, where the data are damaged or have another
+/// @throws std::runtime_error, without the file's name, if the data are damaged or have another
 /// size.
 ChunkBytes unpackChunk(ChunkCompression compression, ChunkBytes packed, std::uint64_t claimed);
 

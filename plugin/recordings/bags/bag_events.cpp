@@ -24,17 +24,16 @@ constexpr std::int64_t kMaxHostDelayNs = kNanosecondsPerSecond;
 constexpr std::size_t kBlockEvents = 16'384;
 constexpr int kClockPackets = 100;
 constexpr std::int64_t kSameClockNs = 10'000'000;       // cameras that are synchronised by wire
-constexpr std::int64_t kContinuedClockNs = 50'000'000;  // bags of one recording: also drift
+constexpr std::int64_t kContinuedClockNs = 50'000'000;  // bags of one recording: includes drift
 
 constexpr std::int64_t wrapNs(int bits) { return (std::int64_t{1} << bits) * 1'000; }
 
-/// An encoding of EventPacket.
 struct PacketEncoding {
   std::string_view name;
-  std::optional<EvtEncoding> evt;  ///< Its words; else `decode` takes a packet.
+  std::optional<EvtEncoding> evt;  ///< EVT words; unset: `decode` takes a packet.
   std::int64_t wrap_ns = 0;
   void (*decode)(const EventPacketMessage& packet, std::vector<Event>& events) = nullptr;
-  bool has_host_times = false;  ///< Always Unix times: no clock is fitted.
+  bool has_host_times = false;  ///< True: Unix times, no clock is fitted.
 };
 
 constexpr PacketEncoding kPacketEncodings[] = {
@@ -52,8 +51,8 @@ class BagEventDecoder {
   /// @param topic its name and type.
   explicit BagEventDecoder(const BagTopic& topic) : type_(rosTypeOf(topic.type)) {}
 
-  /// Takes the first 100 packets with events into account, for the sensor's clock. Nothing to do
-  /// for EventArray: its events have the host's time. Never throws at damaged data.
+  /// Fits the sensor's clock to the first 100 packets with events. Does nothing for EventArray,
+  /// whose events have the host's time. Never throws at damaged data.
   void fitClock(const BagCursor& cursor) {
     if (type_ != RosType::kEventPacket) return;
     BagMessage message;
@@ -68,7 +67,7 @@ class BagEventDecoder {
         ++packets;
       }
     } catch (const std::runtime_error&) {
-      // Reading comes to it, after the events before.
+      // `decode` reports the damage, after the events before it.
     }
     // The time base of `mono` is the host's time or the sensor's.
     if (!evt_ && (hasHostTimes() || clock_.isHostClock())) clock_.useHostTime();
@@ -96,20 +95,20 @@ class BagEventDecoder {
     const std::int64_t shift_ns = clock_.shiftFor(packet.stamp_ns, events[first].t_ns);
     for (std::size_t i = first; i < events.size(); ++i) events[i].t_ns += shift_ns;
   }
-  /// The next message is not the one after the last one.
-  /// @param inside the recording: until the first event whose time and row are known, events
-  /// without them are not counted.
+  /// Prepares for a message that does not follow the last message.
+  /// @param inside true if reading starts inside the recording: events without time or row are then
+  /// not counted before the first event that has both.
   void restart(bool inside) {
     count_undated_ = !inside;
     sequence_.reset();
     if (evt_) evt_->reset();
   }
 
-  /// Gaps in the numbers of the packets so far.
+  /// The number of missing packets so far, from gaps in their numbers.
   std::uint64_t lostPackets() const { return lost_packets_; }
-  /// Events without a time or row so far: see `EventStream::undatedEvents`.
+  /// The number of events without time or row so far: see `EventStream::undatedEvents`.
   std::uint64_t undatedEvents() const { return undated_events_; }
-  /// Of the last message; nothing where the message does not say it.
+  /// The size in the last message that has it; std::nullopt if there was none.
   std::optional<CameraSize> size() const { return size_; }
 
  private:
@@ -149,10 +148,10 @@ class BagEventDecoder {
 
   RosType type_;
   std::optional<CameraSize> size_;
-  const PacketEncoding* encoding_ = nullptr;  // of EventPacket
-  std::optional<EvtDecoder> evt_;             // of the EVT encodings
+  const PacketEncoding* encoding_ = nullptr;  // for EventPacket
+  std::optional<EvtDecoder> evt_;             // for the EVT encodings
   SensorClock clock_{0};
-  std::optional<std::uint64_t> sequence_;  // of the last packet
+  std::optional<std::uint64_t> sequence_;  // number of the last packet
   std::uint64_t lost_packets_ = 0;
   bool count_undated_ = true;
   std::uint64_t undated_events_ = 0;
@@ -161,7 +160,7 @@ class BagEventDecoder {
 /// The events of one camera: a topic of one or several bags.
 class BagEvents : public EventStream {
  public:
-  /// @param parts of the same topic, in time order, at least one.
+  /// @param parts parts of the same topic, in time order, at least one.
   explicit BagEvents(const std::vector<BagTopicPart>& parts) {
     assert(!parts.empty());
     for (const BagTopicPart& topic : parts) {
@@ -177,7 +176,7 @@ class BagEvents : public EventStream {
     begin(0, kMinTimeNs);
   }
 
-  /// Uses the clock of another camera where the two are synchronised, see SensorClock.
+  /// Uses the clock of another camera if the two are synchronised: see SensorClock.
   void shareClock(BagEvents& other) {
     for (Part& part : parts_) {
       part.decoder.clock().share(other.parts_.front().decoder.clock(), kSameClockNs);
@@ -198,9 +197,9 @@ class BagEvents : public EventStream {
     }
     return !events.empty();
   }
-  /// Bisects the bag's times by the times of events, so that it does not matter how the two relate.
+  /// Bisects the bag's log times by the times of events, so their relation does not matter.
   void seek(std::int64_t t_ns) override {
-    constexpr std::int64_t kWarmUpNs = 20'000'000;  // until EVT words have said time and row
+    constexpr std::int64_t kWarmUpNs = 20'000'000;  // until EVT words have given time and row
     const std::int64_t target_ns = t_ns - kWarmUpNs;
     std::size_t part = parts_.size();
     std::int64_t from_log_ns = kMinTimeNs;
@@ -211,7 +210,7 @@ class BagEvents : public EventStream {
       }
       from_log_ns = searchLog(parts_[part], target_ns);
     } catch (const std::runtime_error&) {
-      part = 0;  // damaged: read in order, so that the events before the damage are there
+      part = 0;  // damaged: read in order, to deliver the events before the damage
       from_log_ns = kMinTimeNs;
     }
     begin(part, from_log_ns);
@@ -263,7 +262,7 @@ class BagEvents : public EventStream {
     log_ns_ = message.log_ns;
     return true;
   }
-  /// The sensor's size in the first message.
+  /// Returns the sensor's size in the first message.
   static std::optional<CameraSize> firstSize(const Part& part) {
     const auto cursor = part.topic.bag->messages(part.topic.topic, kMinTimeNs);
     BagEventDecoder decoder = part.decoder;
@@ -272,11 +271,11 @@ class BagEvents : public EventStream {
     try {
       if (cursor(message)) decoder.decode(message, events);
     } catch (const std::runtime_error&) {
-      // Reading comes to it.
+      // `read` reports the damage.
     }
     return decoder.size();
   }
-  /// The time of the first event that was recorded from a time on; nothing if there is none.
+  /// Returns the time of the first event recorded from a time on; std::nullopt if there is none.
   static std::optional<std::int64_t> firstTime(const Part& part, std::int64_t from_log_ns) {
     const auto cursor = part.topic.bag->messages(part.topic.topic, from_log_ns);
     BagEventDecoder decoder = part.decoder;
@@ -289,7 +288,7 @@ class BagEvents : public EventStream {
     }
     return std::nullopt;
   }
-  /// A time of the bag such that no event of `t_ns` or later was recorded before.
+  /// Returns a log time before which no event of `t_ns` or later was recorded.
   static std::int64_t searchLog(const Part& part, std::int64_t t_ns) {
     constexpr std::int64_t kNearEnoughNs = 50'000'000;
     std::int64_t before_ns = part.topic.bag->firstLogNs();
@@ -311,8 +310,8 @@ class BagEvents : public EventStream {
   std::optional<CameraSize> size_;
   std::size_t part_ = 0;
   BagCursor cursor_;
-  std::int64_t log_ns_;  // of the last message
-  /// The messages of the last block: the index of its first event, the part and the log time.
+  std::int64_t log_ns_;  // log time of the last message
+  /// A message of the last block: the index of its first event, its part and its log time.
   struct MessagePlace {
     std::size_t first;
     std::size_t part;
@@ -323,7 +322,7 @@ class BagEvents : public EventStream {
 
 }  // namespace
 
-/// The multiple of the wrap that is nearest to a difference.
+/// Returns the multiple of the wrap that is nearest to a difference.
 std::int64_t SensorClock::withoutWraps(std::int64_t difference_ns) const {
   if (wrap_ns_ == 0) return 0;
   const std::int64_t half_ns = difference_ns < 0 ? -wrap_ns_ / 2 : wrap_ns_ / 2;

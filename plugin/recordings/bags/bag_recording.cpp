@@ -29,7 +29,7 @@ constexpr std::string_view kDb3Start("SQLite format 3\0", 16);
 constexpr std::string_view kZstdStart = "\x28\xb5\x2f\xfd";
 constexpr const char* kMetadata = "metadata.yaml";
 
-/// "recording.db3.zstd"
+/// Returns whether a file is a bag like "recording.db3.zstd".
 bool isCompressedBag(const fs::path& file) {
   const fs::path inner = file.stem().extension();
   return (inner == ".db3" || inner == ".mcap") && beginsWith(file, kZstdStart);
@@ -62,7 +62,7 @@ std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
                            ": not a bag: expected one of ROS 1 (.bag) or ROS 2 (.db3, .mcap)");
 }
 
-/// The files that metadata.yaml lists, relative to its folder.
+/// Returns the files that metadata.yaml lists, in its folder.
 std::vector<fs::path> filesOfMetadata(const fs::path& metadata) {
   std::vector<fs::path> files;
   std::string compression;
@@ -86,7 +86,7 @@ std::vector<fs::path> filesOfMetadata(const fs::path& metadata) {
   return files;
 }
 
-/// The bags of a file, or of a folder's metadata.yaml in its order.
+/// Opens the bag in a file, or the bags in a folder in the order of its metadata.yaml.
 std::vector<std::shared_ptr<BagSource>> openBagFiles(const fs::path& source) {
   std::vector<std::shared_ptr<BagSource>> bags;
   if (!isFile(source / kMetadata)) {
@@ -134,7 +134,7 @@ bool naturallyBefore(std::string_view a, std::string_view b) {
   return a.size() < b.size();
 }
 
-/// The topics of all bags whose type is known, in the natural order of their names.
+/// Returns the topics of known types in all bags, in the natural order of their names.
 RosTopics topicsOf(const std::vector<std::shared_ptr<BagSource>>& bags) {
   RosTopics topics;
   for (const auto& bag : bags) {
@@ -161,9 +161,9 @@ RosTopics topicsOf(const std::vector<std::shared_ptr<BagSource>>& bags) {
   return topics;
 }
 
-/// Calls `take` for the messages of a topic until it returns false.
-/// @return the error of damage in the bag that ends them; empty without damage.
-/// @throws std::runtime_error naming the message that `take` refuses.
+/// Calls `take` for the messages of a topic until `take` returns false.
+/// @return the error of damage that ends the messages; empty if there is no damage.
+/// @throws std::runtime_error naming the message for which `take` throws.
 template <typename Take>
 std::string forMessages(const RosTopic& topic, const Take& take) {
   for (const BagTopicPart& part : topic.parts) {
@@ -198,7 +198,7 @@ std::string namesOf(const RosTopics& topics) {
   return names.empty() ? "none" : names;
 }
 
-/// The topics of the options that are of a kind; all of that kind if the options name none.
+/// Returns the topics of a kind that the options name; all of this kind if the options name none.
 template <typename IsKind>
 RosTopics chosen(const RosTopics& topics, const ReaderOptions& options, const IsKind& is_kind) {
   RosTopics all;
@@ -224,7 +224,7 @@ void requireTopics(const RosTopics& topics, const ReaderOptions& options,
   }
 }
 
-/// Whether the topic's messages are triggers of a camera, which have the type of events.
+/// Returns whether the topic's messages are triggers of a camera, which have the type of events.
 bool isTrigger(const RosTopic& topic) {
   bool trigger = false;
   if (topic.type != RosType::kEventPacket) return false;
@@ -234,7 +234,7 @@ bool isTrigger(const RosTopic& topic) {
       return false;
     });
   } catch (const std::runtime_error&) {
-    return false;  // reading comes to it
+    return false;  // the reader of events reports the damage
   }
   return trigger;
 }
@@ -265,7 +265,7 @@ void addPoses(const RosTopics& all, RecordingParts& parts) {
 
 std::string_view namespaceOf(std::string_view topic) { return topic.substr(0, topic.rfind('/')); }
 
-/// The calibration of the only camera.
+/// Adds the calibration if there is only one camera.
 void addCalibration(const RosTopics& topics, const RosTopics& cameras, RecordingParts& parts) {
   parts.expected_calibration = "messages sensor_msgs/CameraInfo";
   if (cameras.size() > 1) {

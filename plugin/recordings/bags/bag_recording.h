@@ -9,24 +9,24 @@
 namespace efm {
 
 /// Recordings in ROS bags: ROS 1 (.bag) and ROS 2 (.db3, .mcap, or the folder with metadata.yaml).
-/// Several files are one recording: a topic that is in several of them continues.
+/// Several files are one recording: a topic continues from one file to the next.
 ///
 /// Topics are found by their type (see RosType). Cameras are the topics with events, in the natural
 /// order of their names, left before right: /cam2 before /cam10. Poses come from the only topic
-/// with poses; where there are several, from the only one of geometry_msgs (nav_msgs/Odometry is
-/// mostly an estimate beside them). If several remain, there are no poses, and the error of a
-/// missing part names the topics. ReaderOptions::topics replaces this choice: its events topics are
-/// the cameras, in this order; its pose topic gives the poses; a kind that it does not name is
-/// found by type.
+/// with poses. If there are several topics, poses come from the only topic of geometry_msgs
+/// (nav_msgs/Odometry is mostly an additional estimate). If several topics remain, there are no
+/// poses, and the error about missing poses names the topics. ReaderOptions::topics replaces this
+/// choice. Its event topics are the cameras, in this order; its pose topic gives the poses. If it
+/// has no topic of a kind, topics of this kind are found by type.
 ///
 /// A camera's calibration is sensor_msgs/CameraInfo in the namespace of its events
-/// (/davis/left/camera_info for /davis/left/events). It has no extrinsics, so only one camera takes
-/// its calibration from there; several need a file.
+/// (/davis/left/camera_info for /davis/left/events). It has no extrinsics, so it is used only if
+/// there is one camera. Several cameras need a file.
 
-/// Whether a file is a bag of ROS 1. Never throws.
+/// Returns whether a file is a bag of ROS 1. Never throws.
 bool looksLikeRosbag(const std::filesystem::path& file);
-/// Whether it is a bag of ROS 2: a database, an MCAP file, either compressed as a whole, or a
-/// folder with metadata.yaml. Never throws.
+/// Returns whether a source is a bag of ROS 2: a database or an MCAP file (also compressed as a
+/// whole), or a folder with metadata.yaml. Never throws.
 bool looksLikeRosbag2(const std::filesystem::path& source);
 
 /// @throws std::runtime_error naming the file, topic or byte that is wrong, or the library that

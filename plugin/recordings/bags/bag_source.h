@@ -16,13 +16,13 @@ namespace efm {
 
 struct BagTopic {
   std::string name;  ///< "/davis/left/events"
-  std::string type;  ///< "dvs_msgs/EventArray", also where ROS 2 has "dvs_msgs/msg/EventArray".
+  std::string type;  ///< "dvs_msgs/EventArray", also if ROS 2 has "dvs_msgs/msg/EventArray".
 };
 
-/// A message as a bag stores it: of ROS 1 (little-endian, packed), or CDR with its header of 4
-/// bytes.
+/// A message as a bag stores it: in ROS 1's serialisation (little-endian, packed), or in CDR with
+/// its header of 4 bytes.
 struct BagMessage {
-  std::int64_t log_ns = 0;  ///< When it was recorded.
+  std::int64_t log_ns = 0;  ///< Time at which it was recorded.
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;
   bool cdr = false;
@@ -32,7 +32,7 @@ struct BagMessage {
 /// next call. Returns false at the end.
 using BagCursor = std::function<bool(BagMessage& message)>;
 
-/// A file of recorded ROS messages. Cursors are independent of each other and do not outlive it.
+/// A file of recorded ROS messages. Its cursors are independent and must not outlive it.
 class BagSource {
  public:
   explicit BagSource(std::filesystem::path file) : file_(std::move(file)) {}
@@ -42,7 +42,7 @@ class BagSource {
 
   const std::filesystem::path& file() const { return file_; }
   const std::vector<BagTopic>& topics() const { return topics_; }
-  /// The first and last time at which a message was recorded, of all topics.
+  /// The first and last time at which a message of any topic was recorded.
   std::int64_t firstLogNs() const { return first_log_ns_; }
   std::int64_t lastLogNs() const { return last_log_ns_; }
 
@@ -52,7 +52,7 @@ class BagSource {
   virtual BagCursor messages(std::size_t topic, std::int64_t from_log_ns) = 0;
 
  protected:
-  /// @return its index, the same for a topic of the same name and type.
+  /// @return the topic's index. Topics of the same name and type have the same index.
   std::size_t addTopic(const BagTopic& topic) {
     const auto same = [&](const BagTopic& other) {
       return other.name == topic.name && other.type == topic.type;
@@ -74,7 +74,7 @@ class BagSource {
   std::int64_t last_log_ns_ = 0;
 };
 
-/// "dvs_msgs/EventArray" for "dvs_msgs/msg/EventArray".
+/// Returns "dvs_msgs/EventArray" for "dvs_msgs/msg/EventArray".
 inline std::string typeWithoutMsg(std::string type) {
   const std::size_t msg = type.find("/msg/");
   if (msg != std::string::npos) type.erase(msg, 4);
@@ -83,25 +83,25 @@ inline std::string typeWithoutMsg(std::string type) {
 
 /// Opens a ROS 1 bag of version 2.0 (wiki.ros.org/Bags/Format/2.0), uncompressed, bz2 or lz4.
 ///
-/// Not through rosbag_storage: with flipped bits it reads beyond its buffers (9 of 200 damaged bags
-/// crashed it) and takes memory without bound (274 MB for a bag of 0.8 MB); it prints; and its
-/// index takes some 70 bytes for each message of the bag. Here memory holds 48 bytes for each
-/// chunk.
-/// @throws std::runtime_error naming the file, the byte and what was expected; for a bag without an
-/// index (its recording was cut off), that `rosbag reindex` repairs it.
+/// It does not use rosbag_storage. With flipped bits, rosbag_storage reads beyond its buffers (9 of
+/// 200 damaged bags crashed it) and takes unlimited memory (274 MB for a bag of 0.8 MB). It prints,
+/// and its index takes some 70 bytes for each message. Here memory holds 48 bytes for each chunk.
+/// @throws std::runtime_error naming the file, the byte and the expected value. If the bag has no
+/// index (its recording was cut off), the error says that `rosbag reindex` repairs it.
 std::unique_ptr<BagSource> openRos1Bag(const std::filesystem::path& file);
 
 /// Opens a ROS 2 bag in SQLite: tables `topics` and `messages`, of any version of rosbag2.
 std::unique_ptr<BagSource> openDb3(const std::filesystem::path& file);
 
-/// Opens an MCAP file: chunks without compression, lz4 or zstd, or messages without chunks. Of its
-/// channels, those with CDR or ROS 1 messages are topics. Checksums of chunks and of the summary
-/// are compared. A file without a summary, or whose recording was cut off, is read once from its
+/// Opens an MCAP file: chunks without compression, lz4 or zstd, or messages without chunks. The
+/// channels with CDR or ROS 1 messages are topics. Checksums of chunks and of the summary are
+/// verified. If a file has no summary, or its recording was cut off, it is read once from its
 /// beginning to its end to find the channels and chunks.
 std::unique_ptr<BagSource> openMcap(const std::filesystem::path& file);
 
-/// MCAP files (mcap.dev/spec), for the reader and the writer: a magic word, records and the magic
-/// word again. A record is its op, a size of 64 bits and its content; numbers are little-endian.
+/// The structure of MCAP files (mcap.dev/spec), for reader and writer: a magic word, records and
+/// the magic word again. A record has an op, a size of 64 bits and its content. Numbers are
+/// little-endian.
 
 inline constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 

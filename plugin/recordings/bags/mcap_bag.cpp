@@ -65,11 +65,11 @@ class McapBag : public ChunkedBag {
     std::size_t topic;
     bool cdr;
   };
-  std::map<std::uint16_t, std::string> types_;  // by schema
+  std::map<std::uint16_t, std::string> types_;  // by the schema's id
   std::map<std::uint16_t, Channel> channels_;
 };
 
-/// @return whether the file has an index of its chunks and names their channels there.
+/// Reads the summary. @return whether it has an index of the chunks and their channels.
 bool McapBag::readSummary() {
   const std::uint64_t magic = kMcapMagic.size();
   const std::uint64_t tail_size = kMcapRecordHead + kMcapFooterContent + magic;
@@ -96,7 +96,7 @@ bool McapBag::readSummary() {
     requireChecksum(checksum, section.get(),
                     footer - summary + kMcapRecordHead + kMcapFooterContent - sizeof(checksum));
   });
-  // Chunks refer to channels, which may come behind them.
+  // Chunks refer to channels, which may come after them.
   std::vector<std::pair<std::uint64_t, ByteReader>> indexes;
   bool has_channels = false;
   ByteReader records(section.get(), footer - summary);
@@ -135,7 +135,7 @@ BagChunk McapBag::chunkOfIndex(ByteReader content) const {
   chunk.size = content.number<std::uint64_t>();
   const std::uint32_t size = content.number<std::uint32_t>();
   ByteReader indexes(content.take(size), size);
-  if (size > 0) chunk.topics = 0;  // else it is not known
+  if (size > 0) chunk.topics = 0;  // size 0: the topics are unknown
   while (indexes.remaining() > 0) {
     const auto channel = channels_.find(indexes.number<std::uint16_t>());
     indexes.number<std::uint64_t>();
@@ -159,8 +159,9 @@ void McapBag::takeSchemaOrChannel(McapRecord& record) {
   }
 }
 
-/// Finds channels, chunks, and messages outside chunks, of which many make one chunk here. Where
-/// the data are damaged or cut off, reading the last chunk is the error, after those before it.
+/// Finds channels, chunks and messages outside chunks. Many of the latter form one chunk. If the
+/// data are damaged or cut off, reading the last chunk throws the error, after the chunks before it
+/// are read.
 void McapBag::scanFile() {
   constexpr std::uint64_t kLooseBytes = 1 << 20;
   std::vector<BagChunk> chunks;
@@ -188,7 +189,7 @@ void McapBag::scanFile() {
   for (std::uint64_t offset = kMcapMagic.size(); offset < fileSize();) {
     BagChunk record;
     record.offset = offset;
-    record.size = fileSize() - offset + 1;  // more than there is
+    record.size = fileSize() - offset + 1;  // more than the file has
     McapOp op = McapOp::kChunk;
     if (fileSize() - offset >= kMcapRecordHead) {
       const auto head = readBytes(offset, kMcapRecordHead);
@@ -220,7 +221,7 @@ void McapBag::scanFile() {
     offset = next;
   }
   add(loose);
-  if (damage && topics().empty()) std::rethrow_exception(damage);  // else nobody would say it
+  if (damage && topics().empty()) std::rethrow_exception(damage);  // else nobody would report it
   setChunks(std::move(chunks));
 }
 
@@ -249,7 +250,7 @@ ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
   });
 }
 
-/// @param bytes records.
+/// Decodes the messages in records.
 ChunkMessages McapBag::messagesIn(ChunkBytes bytes) {
   ChunkMessages chunk;
   ByteReader records(bytes.data, bytes.size);

@@ -55,7 +55,7 @@ class Ros1Fields {
     return ByteReader(reinterpret_cast<const std::uint8_t*>(value.data()), value.size())
         .number<T>();
   }
-  /// Seconds and nanoseconds.
+  /// Reads a time of seconds and nanoseconds, each of 32 bits.
   std::int64_t time(std::string_view name) const {
     const std::uint64_t value = number<std::uint64_t>(name);
     return static_cast<std::int64_t>(value & 0xffff'ffffU) * kNanosecondsPerSecond +
@@ -73,7 +73,7 @@ struct Ros1Record {
   std::size_t size;
 };
 
-/// The next of the records that lie one after the other.
+/// Takes the next record.
 Ros1Record takeRecord(ByteReader& bytes) {
   const std::uint32_t header_size = bytes.number<std::uint32_t>();
   const std::uint8_t* const header = bytes.take(header_size);
@@ -117,7 +117,7 @@ class Ros1Bag : public ChunkedBag {
 
 /// @return the position of the summary: connections and chunk infos.
 std::uint64_t Ros1Bag::readBagHeader(std::uint64_t offset) {
-  constexpr std::uint64_t kBagHeaderBytes = 4096;  // padded to this
+  constexpr std::uint64_t kBagHeaderBytes = 4096;  // it is padded to this size
   const std::uint64_t size = std::min(fileSize() - offset, kBagHeaderBytes + 8);
   const auto bytes = readBytes(offset, size);
   const std::uint64_t index = located(offset, [&] {
@@ -196,7 +196,7 @@ void Ros1Bag::addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) 
 }
 
 ChunkMessages Ros1Bag::readChunk(const BagChunk& chunk) {
-  auto file = readBytes(chunk.offset, chunk.size);  // with the index behind the chunk
+  auto file = readBytes(chunk.offset, chunk.size);  // with the index after the chunk
   return located(chunk.offset, [&] {
     ByteReader reader(file.get(), chunk.size);
     const Ros1Record record = takeRecord(reader);

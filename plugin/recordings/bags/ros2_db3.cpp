@@ -56,7 +56,7 @@ class SqlQuery {
   std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement_;
 };
 
-/// The first column of a row.
+/// Returns the log time in the first column of a row.
 std::int64_t logTime(const SqlQuery& row) {
   return std::clamp(row.number(0), -kEndOfTimeNs, kEndOfTimeNs);
 }
@@ -68,7 +68,7 @@ class Db3Bag : public BagSource {
         name_(this->file().string()),
         database_(nullptr, &sqlite3_close) {
     open();
-    // Not views: one could be a query without an end.
+    // Views are not accepted: a view could be an endless query.
     SqlQuery tables(database_.get(), name_,
                     "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND rootpage > 0 AND "
                     "name IN ('topics', 'messages')");
@@ -84,7 +84,7 @@ class Db3Bag : public BagSource {
       const BagTopic topic = {topics.text(1), typeWithoutMsg(topics.text(2))};
       if (addTopic(topic) == ids_.size()) ids_.push_back(topics.number(0));
     }
-    // Each alone: SQLite takes either from its index.
+    // Two queries: SQLite takes each result from its index.
     SqlQuery first(database_.get(), name_, "SELECT min(timestamp) FROM messages");
     SqlQuery last(database_.get(), name_, "SELECT max(timestamp) FROM messages");
     if (first.next() && last.next()) setLogTimes(logTime(first), logTime(last));
@@ -97,12 +97,12 @@ class Db3Bag : public BagSource {
 
   std::string name_;
   std::unique_ptr<sqlite3, decltype(&sqlite3_close)> database_;
-  std::vector<std::int64_t> ids_;  // per topic
+  std::vector<std::int64_t> ids_;  // the topics' ids in the database
 };
 
 void Db3Bag::open() {
-  // Without a journal, SQLite need not create files beside the bag, which may lie on a read-only
-  // disk. A journal has the end of a recording that was cut off.
+  // If there is no journal, SQLite need not create files beside the bag, which may be on a
+  // read-only disk. A journal has the end of a recording that was cut off.
   std::error_code ignored;
   const bool journal = std::filesystem::exists(name_ + "-wal", ignored);
   std::string uri = "file:";
@@ -125,7 +125,7 @@ void Db3Bag::open() {
                 static_cast<int>(std::min<std::uintmax_t>(size, std::numeric_limits<int>::max())));
 }
 
-/// Messages come in the order of their ids, that of the recording: reading by time would jump.
+/// Messages come in the order of their ids, as they were recorded. Reading by time would jump.
 BagCursor Db3Bag::messages(std::size_t topic, std::int64_t from_log_ns) {
   std::int64_t first_id = std::numeric_limits<std::int64_t>::min();
   if (from_log_ns > firstLogNs()) {

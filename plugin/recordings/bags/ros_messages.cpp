@@ -68,7 +68,7 @@ class MessageFields {
     const std::string_view text = bytes_.text(size);
     return cdr_ && !text.empty() ? text.substr(0, text.size() - 1) : text;  // a zero at the end
   }
-  /// @return the stamp.
+  /// Reads the header. @return its stamp.
   std::int64_t header() {
     if (!cdr_) bytes_.number<std::uint32_t>();  // seq
     const std::int64_t t_ns = time();
@@ -97,10 +97,10 @@ class MessageFields {
   bool cdr_;
 };
 
-/// An event of an EventArray: x, y (16 bits), seconds, nanoseconds (32 bits), polarity (8 bits).
+/// Size of an EventArray's event: 16 bits x, 16 y, 32 seconds, 32 nanoseconds, 8 polarity.
 constexpr std::size_t kRosEventBytes = 13;
 
-/// The event at `bytes`, little-endian.
+/// Decodes the little-endian event at `bytes`.
 Event eventAt(const std::uint8_t* bytes) {
   Event event;
   std::uint32_t seconds;
@@ -126,7 +126,7 @@ std::int64_t timeBaseOf(const EventPacketMessage& packet) {
   throw std::runtime_error(notATime("time_base", packet.time_base));
 }
 
-/// Calls `take` for the words of a packet's events. Its errors become those of a word.
+/// Calls `take` for the words of a packet's events, and adds the word's number to its errors.
 template <typename Word, typename Take>
 void forWords(const EventPacketMessage& packet, const Take& take) {
   const std::size_t count = packet.data_size / sizeof(Word);
@@ -239,7 +239,7 @@ void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& e
 void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
   enum Code { kTimeHigh, kTimeLow, kColumn, kRow, kVectorRow, kVector };
   constexpr unsigned kVectorRows = 8;
-  constexpr unsigned kEndRow = 0x1'0000;  // no event has it
+  constexpr unsigned kEndRow = 0x1'0000;  // no event has this row
   const std::int64_t base_us = timeBaseOf(packet) / kNanosecondsPerMicrosecond;
   unsigned high_us = 0;
   unsigned low_us = 0;
@@ -276,7 +276,7 @@ void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>
         for (unsigned i = 0; i < kVectorRows; ++i) {
           if ((word >> i & 1U) != 0) add(vector_row + i, vector_polarity);
         }
-        // Stays beyond every sensor instead of wrapping to row 0.
+        // The row stays beyond every sensor, instead of wrapping to row 0.
         vector_row = std::min(vector_row, kEndRow - 2 * kVectorRows) + kVectorRows;
         break;
       default:
