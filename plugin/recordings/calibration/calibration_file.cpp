@@ -23,7 +23,7 @@ std::string camerasInWords(std::size_t count) {
   return fmt::format("{} camera{}", count, count == 1 ? "" : "s");
 }
 
-/// @throws std::runtime_error where it cannot be read, or is too large for a calibration.
+/// @throws std::runtime_error if the file cannot be read, or is too large for a calibration.
 std::string readText(const std::filesystem::path& file) {
   constexpr std::uintmax_t kMaxBytes = 10'000'000;
   std::error_code error;
@@ -40,7 +40,7 @@ std::string readText(const std::filesystem::path& file) {
   return std::string(withoutByteOrderMark(text.str()));
 }
 
-/// The first word outside comments; empty where there is none.
+/// Returns the first word outside comments; empty if there is none.
 std::string firstWord(const std::string& text) {
   std::istringstream stream(text);
   std::string word;

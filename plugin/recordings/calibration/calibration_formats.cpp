@@ -21,7 +21,7 @@
 namespace efm {
 namespace {
 
-/// @param key of the size, for errors.
+/// Sets the size of the sensor. @param key key of the size, for errors.
 void setSensorSize(const YamlEntry& entry, const char* key, double width, double height,
                    CameraModel& model) {
   for (const double side : {width, height}) {
@@ -32,7 +32,7 @@ void setSensorSize(const YamlEntry& entry, const char* key, double width, double
   model.height = static_cast<int>(height);
 }
 
-/// @throws std::runtime_error naming the entry, where `CameraModel::validate` refuses the model.
+/// @throws std::runtime_error naming the entry, if `CameraModel::validate` rejects the model.
 void requireValid(const YamlEntry& entry, const CameraModel& model) {
   try {
     model.validate();
@@ -65,7 +65,7 @@ CameraModel readKalibrCamera(const YamlEntry& entry, const char* intrinsics_key)
   return model;
 }
 
-/// The camera's clock: t_imu = t_cam + timeshift_cam_imu.
+/// Reads the offset of the camera's clock: t_imu = t_cam + timeshift_cam_imu.
 std::int64_t timeShiftOf(const YamlEntry& entry) {
   constexpr const char* kKey = "timeshift_cam_imu";
   const std::string text = entry.text(kKey);
@@ -74,13 +74,13 @@ std::int64_t timeShiftOf(const YamlEntry& entry) {
   throw entry.failKey(kKey, inQuotes(text), "a time in seconds");
 }
 
-/// Whether a key is "camN" with a number N.
+/// Returns whether a key is "camN" with a number N.
 bool isCameraName(const std::string& name) {
   return name.size() > 3 && name.compare(0, 3, "cam") == 0 &&
          name.find_first_not_of("0123456789", 3) == std::string::npos;
 }
 
-/// The number of cameras: cam0, cam1, … without gaps.
+/// Counts the cameras: cam0, cam1, … without gaps.
 std::size_t countCameras(const std::string& file, const YAML::Node& root) {
   std::set<std::string> names;
   if (root.IsMap()) {
@@ -269,7 +269,7 @@ constexpr const char* kLeft = "_LEFT";
 constexpr const char* kRight = "_RIGHT";
 constexpr const char* kPose = "_LEFT2RIGHT_POSE";
 
-/// The line without blanks and a comment.
+/// Returns the line without its comment, and without blanks at both ends.
 std::string_view iniContent(std::string_view line) {
   for (const std::string_view comment : {";", "#", "//", "%"}) {
     line = line.substr(0, line.find(comment));
@@ -282,7 +282,7 @@ bool isSection(std::string_view line) {
          line.find_first_of(", ") == std::string_view::npos;
 }
 
-/// A value in brackets is a list.
+/// Makes a node of a value. A value in brackets is a list.
 YAML::Node nodeOf(std::string_view value) {
   if (value.size() < 2 || value.front() != '[' || value.back() != ']') {
     return YAML::Node(std::string(value));
@@ -294,7 +294,7 @@ YAML::Node nodeOf(std::string_view value) {
   return list;
 }
 
-/// Sections and their keys, so that YamlEntry reads the values as strictly as those of YAML.
+/// Returns sections and keys as YAML, so that YamlEntry reads their values as strictly.
 std::map<std::string, YAML::Node> iniSections(std::string_view text,
                                               const std::filesystem::path& file) {
   std::map<std::string, YAML::Node> sections;

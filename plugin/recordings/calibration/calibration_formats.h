@@ -20,13 +20,13 @@ namespace efm {
 ///   resolution         [width, height]
 ///   T_cn_cnm1          4x4, for cameras after the first: from the camera before it to this one
 ///   timeshift_cam_imu  seconds, optional: t_imu = t_cam + timeshift_cam_imu.
-/// The rig's frame and clock are camera 0's: a camera's time offset is its timeshift minus that of
-/// camera 0. Other keys are ignored. Rotations may be off by 1e-3, because of
+/// The rig's frame and clock are those of camera 0: a camera's time offset is its timeshift minus
+/// the timeshift of camera 0. Other keys are ignored. Rotations may have errors of 1e-3, because of
 /// rounding; the nearest rotation is taken.
 Rig readCamchain(const std::filesystem::path& file);
 
-/// The pose T_imu_rig of the rig, camera 0, on the IMU: the inverse of camera 0's T_cam_imu (4x4).
-/// @return nothing if the camera chain does not have it.
+/// Reads T_imu_rig, the rig's pose on the IMU: the inverse of camera 0's T_cam_imu (4x4).
+/// @return std::nullopt if the camera chain does not have T_cam_imu.
 std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file);
 
 /// Reads one camera from the YAML of ROS (sensor_msgs/CameraInfo as camera_calibration writes it):
@@ -41,18 +41,18 @@ CameraModel readCameraInfo(const YamlEntry& root);
 /// two frame cameras, cam1 and cam2. p_camN = T_N(N-1) * p_cam(N-1); p_camRectN = R_rectN * p_camN.
 
 /// Reads the rig of the event cameras from cam_to_cam.yaml: `intrinsics` (cam0, cam3) and
-/// `extrinsics` (T_10, T_21, T_32, R_rect1). Its camera 1 is cam3:
+/// `extrinsics` (T_10, T_21, T_32, R_rect1). Camera 1 of the rig is cam3:
 ///   T_rig_cam1 = (T_32 * T_21 * T_10)^-1.
 /// The calibration has T_camRect1_rig = R_rect1 * T_10, which the hand-eye transform needs.
 Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::path& file);
 
 /// Reads the pose of the rig on the LiDAR from cam_to_lidar.yaml:
 ///   T_lidar_rig = T_lidar_camRect1 * T_camRect1_rig.
-/// @param calibration of the same rig; null: none is given.
+/// @param calibration calibration of the same rig; null: none is given.
 Rigid3 readDsecHandEye(const YamlEntry& root, const Calibration* calibration);
 
-/// TUM-VIE (Klenk et al., IROS 2021): JSON whose keys are below `value0`. Of its four cameras, 2
-/// and 3 are the event cameras. JSON is read as YAML, which contains it.
+/// TUM-VIE (Klenk et al., IROS 2021): JSON whose keys are below `value0`. Its cameras 2 and 3 (of
+/// four) are the event cameras. JSON is a part of YAML, and is read as YAML.
 
 /// Reads the rig of the event cameras from camera-calibration*.json: `intrinsics` (camera_type
 /// kb4, which is equidistant: fx … k4), `resolution`, `T_imu_cam` {px … qw}. T_imu_rig is T_imu_cam
@@ -61,10 +61,10 @@ Calibration readTumVieCalibration(const YamlEntry& root, const std::filesystem::
 
 /// Reads the pose of the rig on the motion-capture marker from mocap-imu-calibration*.json:
 ///   T_marker_rig = T_imu_marker^-1 * T_imu_rig.
-/// @param calibration of the same rig; null: none is given.
+/// @param calibration calibration of the same rig; null: none is given.
 Rigid3 readTumVieHandEye(const YamlEntry& root, const Calibration* calibration);
 
-/// Whether a text begins, comments aside, with a section of an .ini file: "[NAME]".
+/// Returns whether a text begins, after comments, with a section of an .ini file: "[NAME]".
 bool looksLikeIni(std::string_view text);
 
 /// Reads a camera, or two, from an .ini file as MRPT's camera calibration writes it (`TCamera`,
@@ -74,7 +74,7 @@ bool looksLikeIni(std::string_view text);
 ///   fx fy cx cy       pixels
 ///   distortion_model  none | plumb_bob (radtan) | kannala_brandt (equidistant); also `distortion`
 ///   dist              [k1 k2 p1 p2 k3 …], more than five only if they are 0 | [k1 k2 k3 k4]
-/// and of the pose of the right camera on the left one:
+/// The key of the pose of the right camera on the left camera:
 ///   pose_quaternion   [x y z qw qx qy qz]
 /// Other keys and sections are ignored. The left camera is camera 0.
 Rig readMrptCameras(std::string_view text, const std::filesystem::path& file);

@@ -17,7 +17,7 @@ std::string placeOf(const std::string& file, const YAML::Mark& mark) {
   return mark.is_null() ? file : fmt::format("{}:{}", file, mark.line + 1);
 }
 
-/// yaml-cpp would read it as the locale of the host program has it.
+/// Parses a number without yaml-cpp, which would use the locale of the host program.
 std::optional<double> finiteIn(const YAML::Node& node) {
   std::string_view text = node.Scalar();
   if (text.substr(0, 1) == "+" && text.substr(1, 1) != "-") text.remove_prefix(1);

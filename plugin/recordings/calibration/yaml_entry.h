@@ -18,27 +18,27 @@ namespace efm {
 /// "FILE:LINE: NAME: KEY = VALUE: expected …".
 class YamlEntry {
  public:
-  /// @param name errors call the part so; empty for the whole file.
+  /// @param name name of the part in errors; empty for the whole file.
   YamlEntry(std::string file, std::string name, const YAML::Node& node);
 
   bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   std::string text(const char* key) const;
-  /// Finite numbers.
-  /// @param count their number; 0: any.
+  /// Reads finite numbers.
+  /// @param count expected number of numbers; 0: any.
   /// @param expected the meaning of the numbers, for errors.
   std::vector<double> numbers(const char* key, std::size_t count, const char* expected) const;
   double number(const char* key) const;
-  /// A list of rows.
-  /// @param rows their number; 0: any.
+  /// Reads a list of rows.
+  /// @param rows expected number of rows; 0: any.
   Eigen::MatrixXd matrix(const char* key, int rows, int columns) const;
-  /// A 3x3 matrix. It may be off by 1e-3, because of rounding; the nearest rotation is taken.
+  /// Reads a 3x3 matrix. It may have errors of 1e-3 (rounding); the nearest rotation is taken.
   Eigen::Quaterniond rotation(const char* key) const;
-  /// A 4x4 matrix; its rotation as `rotation` has it.
+  /// Reads a 4x4 matrix; its rotation is taken as in `rotation`.
   Rigid3 transform(const char* key) const;
 
-  /// The keys and values below a key; errors call it "NAME: KEY".
+  /// Returns the keys and values below a key; errors name them "NAME: KEY".
   YamlEntry section(const char* key) const;
-  /// The keys and values of an item of a list, from 0.
+  /// Returns the keys and values of an item of a list; `index` is from 0.
   YamlEntry item(const char* key, std::size_t index) const;
 
   std::runtime_error failKey(const char* key, std::string_view found,
@@ -60,7 +60,7 @@ class YamlEntry {
   YAML::Node node_;
 };
 
-/// @throws std::runtime_error naming the file, and the line where it is not YAML.
+/// @throws std::runtime_error naming the file, and the line that is not YAML.
 YAML::Node loadYaml(const std::string& file);
 
 }  // namespace efm
