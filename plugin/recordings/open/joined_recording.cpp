@@ -13,7 +13,7 @@
 namespace efm {
 namespace {
 
-/// @param poses in the order of time.
+/// Cuts the poses, see `join`. @param poses in the order of time.
 void cutPoses(const TimeLimits& limits, std::vector<PoseSample>& poses) {
   if (!limits.t0_ns && !limits.t1_ns) return;
   std::set<PoseSourceId> has_before, has_after;
@@ -26,7 +26,7 @@ void cutPoses(const TimeLimits& limits, std::vector<PoseSample>& poses) {
   const auto begin = std::find_if(poses.begin(), poses.end(), [&](const PoseSample& pose) {
     return !limits.t0_ns || pose.t_ns >= *limits.t0_ns;
   });
-  for (auto pose = begin; pose != poses.begin();) {  // the newest before t0
+  for (auto pose = begin; pose != poses.begin();) {  // the newest poses before t0
     if (keep(*--pose)) kept.push_back(std::move(*pose));
   }
   std::reverse(kept.begin(), kept.end());
@@ -123,11 +123,11 @@ class JoinedRecording : public Recording {
     for (const EventPackets& camera : parts_.cameras) {
       names += (names.empty() ? "" : ", ") + camera.stream().name();
     }
-    if (!damage().empty()) return;  // it comes after the poses
+    if (!damage().empty()) return;  // the error comes after the poses
     throw std::runtime_error(names + ": no events: expected at least one");
   }
 
-  /// Empty: there is none so far.
+  /// Returns the error of damage; empty if there is none so far.
   std::string damage() const {
     std::string damage = parts_.poses_damage;
     for (const EventPackets& camera : parts_.cameras) {
@@ -136,12 +136,12 @@ class JoinedRecording : public Recording {
     return damage;
   }
 
-  /// Whether the next packet begins no earlier, or there is none.
+  /// Returns whether there is no next packet, or it does not begin before this time.
   bool isDue(std::int64_t t_ns) const {
     return !packet_ || nearestTick(t_ns) <= nearestTick(*packet_->t_ns);
   }
 
-  /// An error of the events comes after all poses.
+  /// Reads the next packet and object. An error of the events comes after all poses.
   void readAhead() {
     try {
       if (!packet_ && !error_) packet_ = nextPacket();
@@ -155,7 +155,7 @@ class JoinedRecording : public Recording {
     }
   }
 
-  /// The camera with the earliest next packet; of several the first one.
+  /// Returns the camera with the earliest next packet; the first camera if times are equal.
   std::optional<std::size_t> nextCamera() {
     std::optional<std::size_t> first;
     std::int64_t first_ns = kEndOfTimeNs;
@@ -191,8 +191,8 @@ class JoinedRecording : public Recording {
   std::unique_ptr<BadEvents> bad_;  // the cameras refer to it
   std::size_t announced_ = 0;       // number of empty packets so far
   std::size_t next_pose_ = 0;
-  std::optional<EventPacket> packet_;  // the next one
-  std::optional<OtherSample> other_;   // the next one
+  std::optional<EventPacket> packet_;  // the next packet
+  std::optional<OtherSample> other_;   // the next object
   std::exception_ptr error_;           // the error that ended the events or the others
   std::string packet_position_;
   std::string position_ = "the recording";

@@ -13,32 +13,32 @@
 
 namespace efm {
 
-/// What a recording is put together from.
+/// The parts that `join` puts together.
 struct JoinedParts {
-  Rig rig;                               ///< As the packets have it.
+  Rig rig;                               ///< Rig that the packets have.
   std::vector<EventPackets> cameras;     ///< One per camera of the rig.
-  std::vector<std::int64_t> offsets_ns;  ///< From a camera's clock to that of the poses.
-  std::vector<PoseSample> poses;         ///< In any order; poses of equal time keep theirs.
+  std::vector<std::int64_t> offsets_ns;  ///< Offset from a camera's clock to the poses' clock.
+  std::vector<PoseSample> poses;         ///< The poses in any order; equal times keep theirs.
   std::string poses_damage;  ///< The error that ended the poses: thrown at the recording's end.
-  std::unique_ptr<OtherStream> others;  ///< May be null.
-  bool all_poses = false;  ///< Poses outside the interval are kept, too: a mapping looks at those.
-  std::int64_t latency_ns = 0;  ///< A pose comes this long after its time.
-  /// The number of bad events that are left out, of all cameras together; a further one is an
+  std::unique_ptr<OtherStream> others;  ///< Other objects; may be null.
+  bool all_poses = false;       ///< True if poses outside the interval are kept, for a mapping.
+  std::int64_t latency_ns = 0;  ///< Delay of each pose after its time.
+  /// The maximum number of bad events that are left out, of all cameras together. One more is an
   /// error.
   std::uint64_t skip_bad_events = 0;
-  std::vector<Warning> warnings;  ///< The first of those in `RecordingCounts`.
+  std::vector<Warning> warnings;  ///< Warnings that come first in `RecordingCounts`.
 };
 
-/// Puts the parts in the order of time. Of an interval [t0, t1) on the clock of the poses, there
-/// are its events, its poses, and of each source the nearest pose before and after, so that events
-/// keep poses on both sides. Most events outside are not read, if their format has an index.
+/// Puts the parts in the order of time. For limits [t0, t1) on the clock of the poses, it keeps the
+/// events and poses inside, and the nearest pose of each source before and after, so that events
+/// have poses on both sides. Most events outside are not read if their format has an index.
 ///
 /// The first packets are empty, one per camera. Each further packet has the events of one camera in
-/// a period. A packet covers its camera until the camera's next event, and the camera's last packet
-/// covers it for ever (`kEndOfTimeNs`): nobody waits for a silent camera. The very last packet has
-/// no such time: there the recording ends. If a stream has a wrong event, all samples before it
-/// come before the error.
-/// @throws std::runtime_error if there are cameras and no limits, and none has an event.
+/// a period. After a packet, its camera is complete until the camera's next event. After the
+/// camera's last packet, it is complete for ever (`kEndOfTimeNs`), so nobody waits for a silent
+/// camera. The last packet of the recording has no such time. If a stream has a wrong event, all
+/// samples before the event come before the error.
+/// @throws std::runtime_error if there are cameras and no limits, and no camera has an event.
 std::unique_ptr<Recording> join(JoinedParts parts, const TimeLimits& limits);
 
 }  // namespace efm

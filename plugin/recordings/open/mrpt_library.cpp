@@ -8,7 +8,7 @@
 namespace efm {
 namespace {
 
-/// The folder of the library, or of the program, that has this code.
+/// Returns the folder of the library, or of the program, that has this code.
 std::filesystem::path ownFolder() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<void*>(&ownFolder), &info) == 0) return {};

@@ -13,12 +13,11 @@
 
 namespace efm {
 
-/// Writes a recording as a rawlog.
 class RawlogWriter {
  public:
   virtual ~RawlogWriter() = default;
   virtual void write(Sample sample) = 0;
-  /// Completes the file. Without it there is none.
+  /// Completes the file. If it is not called, there is no file.
   virtual void close() = 0;
 };
 
@@ -28,8 +27,8 @@ enum class RawlogCompression { kGzip, kZstd, kNone };
 struct MrptLibrary {
   RecordingParts (*openRawlog)(const std::filesystem::path& file, const ReaderOptions& options);
   /// @param file an earlier file of this name is replaced: see AtomicFile.
-  /// @param compression gzip for the whole file, MRPT's default; or Zstandard for the events alone,
-  /// three times as fast, in a plain file.
+  /// @param compression gzip for the whole file, MRPT's default; or Zstandard for the events only,
+  /// three times as fast, in an uncompressed file.
   std::unique_ptr<RawlogWriter> (*writeRawlog)(const std::filesystem::path& file,
                                                RawlogCompression compression);
   void (*writeSimpleMap)(const std::filesystem::path& file,
@@ -38,12 +37,12 @@ struct MrptLibrary {
   std::unique_ptr<MapWatcher> (*recordFrames)(const std::filesystem::path& folder, bool force);
 };
 
-/// Loads the library: from the folder of libevent-fusion.so, then as the system's loader finds it.
-/// @param for_what the file or option that needs it, for the error.
-/// @throws std::runtime_error naming these, the library and why it cannot be loaded.
+/// Loads the library: from the folder of libevent-fusion.so, else with the system's search.
+/// @param for_what the file or option that needs the library, for the error.
+/// @throws std::runtime_error naming `for_what`, the library and why it cannot be loaded.
 const MrptLibrary& mrptLibrary(const std::string& for_what);
 
-/// A symbol of a library that is found in the same way. The library is never closed.
+/// Returns a symbol of a library that is found in the same way. The library is never closed.
 void* symbolOf(const std::string& library, const std::string& symbol, const std::string& for_what);
 
 }  // namespace efm

@@ -38,7 +38,7 @@ const RecordingFormat* formatNamed(const std::string& name) {
   throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
 }
 
-/// Whether the user calls a file of no other format a rawlog, or it is one.
+/// Returns whether a file of no other format has the name or the content of a rawlog.
 bool isRawlog(const Path& path) {
   return path.filename().string().find(".rawlog") != std::string::npos || !whyNoRawlog(path);
 }
@@ -53,7 +53,7 @@ const RecordingFormat& rawlogFormat() {
   return format;
 }
 
-/// The format of a source; null for a file of no format.
+/// Returns the format of a source; null for a file of no format.
 const RecordingFormat* formatOf(const Path& path, const RecordingSource& source) {
   const std::string& name = source.format;
   if (!std::filesystem::exists(path)) {
@@ -102,7 +102,7 @@ bool reads(const Read& read) {
   }
 }
 
-/// Whether it is a file that readCalibration reads.
+/// Returns whether `readCalibration` reads a file.
 bool isCalibration(const Path& path) {
   constexpr std::uintmax_t kMaxBytes = 100'000;
   std::error_code error;
@@ -110,13 +110,13 @@ bool isCalibration(const Path& path) {
          reads([&] { readCalibration(path); });
 }
 
-/// Whether it is a text of poses, also a compressed one.
+/// Returns whether a file is a text of poses, also a compressed text.
 bool isPoses(const Path& path) {
   bool poses = false;
   return reads([&] { poses = isFile(path) && looksLikePoseLines(beginningOfText(path)); }) && poses;
 }
 
-/// Says what a file is that is no recording, or what the reader that fits best does not accept.
+/// Throws an error: the kind of a file that is no recording, or the best-fitting reader's problem.
 [[noreturn]] void refuse(const Path& path) {
   const std::string name = path.string();
   if (path.extension() == ".ini" && !isCalibration(path)) {
@@ -138,10 +138,10 @@ bool isPoses(const Path& path) {
                   name, why));
 }
 
-/// The only file of a folder that has a part of the recording which its format did not find. Others
-/// are named in what is expected.
-/// @param has whether a file has it.
-/// @param option that gives another one.
+/// Returns the only file of a folder with a part of the recording that its format did not find. If
+/// there are several such files, it adds their names to the text `expected`.
+/// @param has function that returns whether a file has the part.
+/// @param option option that gives another file.
 template <typename Has>
 std::optional<Path> onlyFileOf(const Path& folder, const Has& has, const char* option,
                                RecordingParts& parts, std::string& expected) {
@@ -163,7 +163,7 @@ std::optional<Path> onlyFileOf(const Path& folder, const Has& has, const char* o
   return std::nullopt;
 }
 
-/// Takes the calibration and the poses that a folder has with other names than its format knows.
+/// Takes calibration and poses of a folder from files whose names its format does not know.
 void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
   const Path& folder = source.files.front();
   if (source.files.size() != 1 || !std::filesystem::is_directory(folder)) return;
@@ -184,7 +184,7 @@ void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
   }
 }
 
-/// Files of the same format are opened together.
+/// Opens the files. Successive files of the same format are opened together.
 RecordingParts openParts(const RecordingSource& source) {
   RecordingParts all;
   for (std::size_t i = 0; i < source.files.size();) {
@@ -208,7 +208,7 @@ RecordingParts openParts(const RecordingSource& source) {
   return all;
 }
 
-/// The size of a camera's sensor: of the stream, the recording's own calibration, or the given one.
+/// Returns a sensor's size: from the stream, the recording's own or the given calibration.
 std::optional<CameraSize> knownSizeOf(const RecordingParts& parts, std::size_t camera,
                                       const Calibration* given) {
   if (const auto size = parts.cameras[camera]->size()) {
@@ -223,8 +223,8 @@ std::optional<CameraSize> knownSizeOf(const RecordingParts& parts, std::size_t c
   return std::nullopt;
 }
 
-/// The same, or that of the option, or the format's usual one.
-/// @throws std::runtime_error where the option has another size than is known.
+/// Returns `knownSizeOf`, else the size in the option, else the format's usual size.
+/// @throws std::runtime_error if the option differs from the known size.
 std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
                                  const Calibration* given, const RecordingSource& source) {
   const std::optional<CameraSize> known = knownSizeOf(parts, camera, given);
@@ -238,8 +238,8 @@ std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera
   return known;
 }
 
-/// The recording's own rig if it has one and it is not replaced: then a mapping replaces it, and
-/// counts the difference.
+/// Returns the recording's own rig if it has one and it is not replaced here. A mapping then
+/// replaces the rig, and counts the difference.
 Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given) {
   const std::size_t count = parts.cameras.size();
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
@@ -270,7 +270,7 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
   return rig;
 }
 
-/// The time offsets of the cameras that a mapping uses.
+/// Returns the time offsets of the cameras that a mapping uses.
 std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& source,
                                     const Calibration* given) {
   if (source.time_offsets_ns.size() == rig.cameras.size()) return source.time_offsets_ns;
@@ -281,7 +281,7 @@ std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& sourc
   return offsets_ns;
 }
 
-/// The poses of a file that has no more than these.
+/// Makes samples of poses without other data.
 std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool rounded) {
   std::vector<PoseSample> samples;
   samples.reserve(poses.size());
@@ -294,8 +294,8 @@ std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool ro
   return samples;
 }
 
-/// The poses of each tracker with the faults. An inserted pose is a copy of the one after it, but
-/// for time and T_world_body.
+/// Applies the faults to the poses of each tracker. An inserted pose is a copy of the next pose,
+/// except for its time and T_world_body.
 std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFaults faults,
                                    bool rounded) {
   faults.perturbation.tick_ns = kTickNs;
@@ -312,7 +312,7 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
     for (const PoseSample& sample : tracked) poses.push_back({sample.t_ns, sample.T_world_body});
     auto next = tracked.begin();
     for (const StampedPose& pose : efm::withFaults(poses, faults)) {
-      while (next->t_ns < pose.t_ns) ++next;  // lost, or used
+      while (next->t_ns < pose.t_ns) ++next;  // lost, or used already
       PoseSample& sample = all.emplace_back(*next);
       if (next->t_ns == pose.t_ns) ++next;
       sample.t_ns = pose.t_ns;
@@ -323,7 +323,7 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
   return all;
 }
 
-/// The poses of the file, or the recording's own; with the faults.
+/// Returns the poses of the given file, else the recording's own poses, with the faults.
 std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<StampedPose>& given,
                                 const RecordingSource& source, const RigSetup& setup) {
   const bool replaced = !source.poses.empty();
@@ -347,7 +347,7 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<Stamped
   return samples;
 }
 
-/// @param given how the user gave the file; empty: as the value of `option`.
+/// @param given words for how the file was given; empty: as the value of `option`.
 void requireGivenFile(const Path& file, const char* option, const std::string& given) {
   if (std::filesystem::exists(file)) return requireNoPipe(file);
   if (file.empty()) return;

@@ -33,7 +33,7 @@ Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
       "a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001");
 }
 
-/// @param first the pose's first column.
+/// @param first index of the pose's first column.
 Rigid3 poseOf(const std::shared_ptr<NpyArray>& array, std::uint64_t row, std::size_t first) {
   const auto number = [&](std::size_t k) { return NpyArray::columnOf(array, k).number(row); };
   if (array->columns() == 16) {
@@ -56,7 +56,7 @@ std::string shapeOf(const NpyArray& array) {
   return fmt::format("({})", fmt::join(array.header().shape, ", "));
 }
 
-/// The arrays of a recording's poses; `times` is null where the poses begin with a time.
+/// The arrays of a recording's poses; `times` is null if each row of `poses` begins with a time.
 struct PoseArrays {
   std::shared_ptr<NpyArray> times;
   std::shared_ptr<NpyArray> poses;
@@ -82,7 +82,7 @@ bool namesPoses(const std::string& member) {
   return name == "poses" || name == "pose" || name == "T_world_body" || name == "trajectory";
 }
 
-/// The member that fits: the only one, or the one with a fitting name.
+/// Opens the member that fits: the only candidate, or the only candidate with a fitting name.
 std::shared_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
                                       std::vector<std::string> candidates, const char* what,
                                       bool (*has_name)(const std::string&),
@@ -132,11 +132,11 @@ PoseArrays openPoseArrays(const std::filesystem::path& file) {
           chooseArray(file, poses, "the poses", namesPoses, all)};
 }
 
-/// The unit of the times that the array's name says, else that of the first ones.
+/// Returns the exponent of the unit of times: from the array's name, else from the first times.
 int timeExponentOf(const RowColumn& times, const std::string& name, const ReaderOptions& options) {
   constexpr std::uint64_t kSample = 4096;
   const auto exponent = headerWord(std::filesystem::path(name).stem().string()).time_exponent;
-  if (exponent) return *exponent;  // t_us.npy
+  if (exponent) return *exponent;  // for example t_us.npy
   TimeSample sample;
   for (std::uint64_t row = 0; row < std::min(times.rows->size(), kSample); ++row) {
     const double t = times.number(row);

@@ -92,7 +92,7 @@ constexpr UnreadFormat kUnreadFormats[] = {
     {"<?xml"sv, "an XML document", "the download failed, or it is no recording"},
 };
 
-/// Formats of recordings that are read, but not while the file is compressed.
+/// Formats of recordings that are read only if the file is not compressed.
 constexpr UnreadFormat kReadUnpacked[] = {
     {"#ROSBAG V"sv, "a compressed ROS 1 bag", kUnpack},
     {"\x89MCAP"sv, "a compressed MCAP file", kUnpack},
@@ -102,7 +102,7 @@ constexpr UnreadFormat kReadUnpacked[] = {
     {"#!AER-DAT4"sv, "a compressed AEDAT4 file", kUnpack},
 };
 
-/// Text from its first character that is no blank, in small letters.
+/// Returns a text in small letters, without blanks at its beginning.
 std::string asMarkup(std::string_view text) {
   std::string small;
   for (const char c : text) {
@@ -126,14 +126,14 @@ std::optional<std::string> nameIn(const UnreadFormat (&table)[N], const std::str
   return std::nullopt;
 }
 
-/// Whether a file is the report.json of a run.
+/// Returns whether a file is the report.json of a run.
 bool isReport(const fs::path& file) {
   constexpr std::size_t kMostBytes = 1 << 20;
   const std::string text = firstBytesOf(file, kMostBytes);
   return text.compare(0, 1, "{") == 0 && text.find("\"votes_per_second\"") != std::string::npos;
 }
 
-/// The name of a file or folder that this program writes.
+/// Describes a file or folder that this program writes; null for others.
 const char* ownResult(const fs::path& source) {
   if (isFile(source / "report.json") && isReport(source / "report.json")) {
     return "the result of an earlier run";
@@ -170,9 +170,9 @@ std::optional<std::string> unreadFile(const fs::path& file) {
   return nameIn(kUnreadFormats, bytes);
 }
 
-/// A folder is named by the first file that is known.
+/// Describes a folder by its first file of a known kind.
 std::optional<std::string> unreadFolder(const fs::path& folder) {
-  constexpr std::size_t kMost = 100;  // of a folder of pictures, some are enough
+  constexpr std::size_t kMost = 100;  // some files of a folder of pictures are enough
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (isFile(entry.path()) && files.size() < kMost) files.push_back(entry.path());
@@ -198,9 +198,9 @@ bool isNameCharacter(char c) {
          c == ':' || c == '<' || c == '>' || c == ',';
 }
 
-/// Whether these are the first bytes of an object: the length of its class's name, the name, the
-/// content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the
-/// lowest first. A truncated file may have fewer bytes.
+/// Returns whether these are the first bytes of an object: the length of its class's name, the
+/// name, the content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes,
+/// the lowest first. A truncated file may have fewer bytes.
 bool beginsAnObject(std::string_view bytes) {
   constexpr std::size_t kShortestName = 3;
   constexpr std::size_t kLongestName = 120;
@@ -234,7 +234,7 @@ std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions op
                              ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
                              "columns with a header), NumPy arrays, or a recording with poses");
   }
-  options.topics_of_other_files = true;  // they are those of the events, too
+  options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
   if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
   if (!parts.poses.empty()) return std::move(parts.poses);

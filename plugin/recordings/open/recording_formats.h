@@ -11,20 +11,20 @@
 
 namespace efm {
 
-/// What a file or folder is that no reader takes, and what to do instead: "a PNG picture: expected
-/// events". Nothing where it is not known, too. Known formats are found by their first bytes, also
+/// Describes a file or folder that no reader takes, and what to do instead: "a PNG picture:
+/// expected events"; std::nullopt if it is unknown. Formats are found by their first bytes, also
 /// within compressed files. Never throws.
 std::optional<std::string> unreadFormat(const std::filesystem::path& source);
 
-/// The formats that this build reads, in the order in which they are tried; a rawlog comes after
-/// them.
+/// Returns the formats that this build reads, in the order in which they are tried. A rawlog is
+/// tried after them.
 const std::vector<RecordingFormat>& readerFormats();
 
-/// The format of a file or folder by its content; null if it is none of `readerFormats`.
+/// Returns the format of a file or folder by its content; null if none of `readerFormats` fits.
 const RecordingFormat* detectFormat(const std::filesystem::path& source);
 
-/// Why the first bytes are not those of a rawlog: "it begins with …"; std::nullopt if they are, and
-/// for a damaged gzip file.
+/// Describes why the first bytes are not those of a rawlog: "it begins with …"; std::nullopt for a
+/// rawlog and for a damaged gzip file.
 std::optional<std::string> whyNoRawlog(const std::filesystem::path& file);
 
 /// Checks the first bytes of a rawlog, compressed or not: the name of an object's class, as MRPT
@@ -43,9 +43,9 @@ std::vector<StampedPose> readPoses(const std::filesystem::path& file,
 ///   one array N x 8           t tx ty tz qx qy qz qw
 ///   a .npz file with N times  and an array N x 7 (tx ty tz qx qy qz qw) or N x 4 x 4
 ///   (T_world_body).
-/// Where several arrays of a .npz file have these shapes, those named t, time, timestamps … and
-/// poses, pose, T_world_body, trajectory. A name may say the unit: t_ns, timestamps_us. Real times
-/// are rounded to microseconds.
+/// If several arrays of a .npz file have these shapes, it reads the arrays that are named t, time,
+/// timestamps … and poses, pose, T_world_body, trajectory. A name may include the unit: t_ns,
+/// timestamps_us. Floating-point times are rounded as in `nanoseconds`.
 std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
                                         const ReaderOptions& options);
 
