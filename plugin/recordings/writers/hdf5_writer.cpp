@@ -25,7 +25,7 @@ void require(bool done, const char* what) {
   if (!done) throw std::runtime_error(what + hdf5Cause());
 }
 
-/// Calls `write`; its errors name the file.
+/// Calls `write`, and adds the name of the file to its errors.
 template <typename Write>
 void naming(const fs::path& file, const Write& write) {
   try {
@@ -35,7 +35,7 @@ void naming(const fs::path& file, const Write& write) {
   }
 }
 
-/// What DSEC's files have: Blosc with shuffled bytes and Zstandard.
+/// Returns the chunk properties of DSEC's files: Blosc with shuffled bytes and Zstandard.
 Hdf5Id chunkProperties(std::size_t number_bytes) {
   constexpr H5Z_filter_t kBlosc = 32001;
   constexpr unsigned kFilterVersion = 2;
@@ -59,11 +59,11 @@ std::string cameraName(std::size_t camera) {
   return fmt::format("cam{}", camera);
 }
 
-/// A list of whole numbers in an HDF5 file, which grows: chunks are compressed by Blosc with
-/// Zstandard. Memory is that of a chunk.
+/// A growing list of whole numbers in an HDF5 file. Blosc with Zstandard compresses the chunks.
+/// Memory holds one chunk.
 class Hdf5List {
  public:
-  /// @param type of the numbers in the file, little-endian; as long as those that are added.
+  /// @param type little-endian type of the numbers in the file, with the size of added numbers.
   Hdf5List(hid_t file, const char* path, hid_t type)
       : number_bytes_(H5Tget_size(type)), chunk_bytes_(number_bytes_ * kChunkNumbers) {
     const hsize_t none = 0;
@@ -119,7 +119,6 @@ class Hdf5List {
   std::uint64_t written_ = 0;  // numbers
 };
 
-/// The file of a camera.
 class Hdf5Camera {
  public:
   explicit Hdf5Camera(fs::path path)
@@ -185,7 +184,7 @@ class Hdf5Camera {
   Hdf5List x_, y_, p_, t_, index_;
   std::optional<std::int64_t> first_us_;
   std::uint64_t events_ = 0;
-  std::uint64_t milliseconds_ = 0;  // in the index
+  std::uint64_t milliseconds_ = 0;  // number of milliseconds in the index
 };
 
 class Hdf5Writer : public RecordingWriter {

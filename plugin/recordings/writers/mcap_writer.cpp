@@ -24,7 +24,7 @@ void appendNumber(std::string& bytes, Number value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(Number));  // little-endian machines
 }
 
-/// The fields of an MCAP record: numbers, and texts after their size.
+/// Returns the fields of an MCAP record as bytes: numbers, and texts after their size.
 template <typename... Fields>
 std::string fieldsOf(const Fields&... fields) {
   std::string bytes;
@@ -45,7 +45,7 @@ std::string mcapRecord(McapOp op, const std::string& content) {
   return static_cast<char>(op) + fieldsOf(std::uint64_t{content.size()}) + content;
 }
 
-/// A ROS 2 message in CDR: values at multiples of their size from the end of the header of 4 bytes.
+/// Writes a ROS 2 message in CDR: after 4 bytes of header, values are at multiples of their size.
 class CdrWriter {
  public:
   /// Adds numbers, and texts, which end with a zero.
@@ -54,7 +54,7 @@ class CdrWriter {
     (addOne(values), ...);
     return *this;
   }
-  /// The whole message, also to append bytes.
+  /// The whole message; bytes may be appended to it.
   std::string& bytes() { return bytes_; }
 
  private:
@@ -73,8 +73,8 @@ class CdrWriter {
   std::string bytes_ = std::string("\0\1\0\0", kHeader);  // little-endian
 };
 
-/// The definitions of the ROS 2 messages that are written, with those of the types inside them, as
-/// MCAP has them (schema encoding ros2msg).
+/// The definitions of the written ROS 2 messages and of the types inside them, in MCAP's form
+/// (schema encoding ros2msg).
 
 #define EFM_RULE \
   "================================================================================\n"
@@ -112,7 +112,7 @@ std::uint32_t checksumOf(std::string_view bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-/// The channels of a camera come after that of the poses: events, camera info.
+/// Returns a camera's channel of events; its camera info is the next one. Poses have channel 1.
 std::uint16_t eventsChannel(std::size_t camera) {
   return static_cast<std::uint16_t>(kPoseChannel + 1 + 2 * camera);
 }
@@ -176,7 +176,7 @@ class McapWriter : public RecordingWriter {
 
   void close() override {
     finishChunk();
-    // No checksum of the data: the chunks have theirs.
+    // The data have no checksum: each chunk has one.
     write(mcapRecord(McapOp::kDataEnd, fieldsOf(std::uint32_t{0})));
     std::string summary = channelRecords() + chunk_indexes_ + statistics();
     summary += static_cast<char>(McapOp::kFooter);
@@ -194,7 +194,7 @@ class McapWriter : public RecordingWriter {
     std::string schema;
     std::string topic;
     std::uint64_t messages = 0;
-    std::string index = {};  // of the chunk: time and position of each message
+    std::string index = {};  // index of the chunk: time and position of each message
   };
   struct Span {
     std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max();
@@ -205,7 +205,7 @@ class McapWriter : public RecordingWriter {
     }
   };
 
-  /// Each channel has a schema of its own, with the channel's id.
+  /// Returns schemas and channels. Each channel has its own schema, with the channel's id.
   std::string channelRecords() const {
     std::string schemas;
     std::string channels;
@@ -220,7 +220,7 @@ class McapWriter : public RecordingWriter {
     return schemas + channels;
   }
 
-  /// A message with its header alone.
+  /// Returns a message that has only its header.
   CdrWriter messageAt(std::int64_t t_ns, std::string_view frame) const {
     const std::int64_t seconds = t_ns / kNanosecondsPerSecond;
     if (t_ns < 0 || seconds > std::numeric_limits<std::int32_t>::max()) {
@@ -333,7 +333,7 @@ class McapWriter : public RecordingWriter {
   OutputFile output_;
   std::uint64_t position_ = 0;
   Rig rig_;
-  std::vector<Channel> channels_;             // id 1 is the first
+  std::vector<Channel> channels_;             // the first has id 1
   std::vector<std::uint64_t> next_sequence_;  // per camera
   std::string chunk_;                         // records
   Span chunk_span_;

@@ -92,7 +92,7 @@ class FolderWriter : public RecordingWriter {
   NewFolder folder_;
   std::vector<OutputFile> events_;  // per camera
   PoseTextFile poses_;
-  std::unique_ptr<OutputFile> truth_;  // the index, if there is any
+  std::unique_ptr<OutputFile> truth_;  // index of the depth maps, if there are any
 };
 
 }  // namespace

@@ -16,16 +16,15 @@
 
 namespace efm {
 
-/// A file to write.
 class OutputFile {
  public:
   explicit OutputFile(std::filesystem::path path) : OutputFile(path, path) {}
-  /// @param name of the complete file, for errors.
+  /// @param name name of the complete file, for errors.
   OutputFile(const std::filesystem::path& path, std::filesystem::path name);
 
   std::ofstream& stream() { return stream_; }
-  /// @throws std::runtime_error naming the file if it could not be written, and why if the last
-  /// bytes could not.
+  /// @throws std::runtime_error naming the file if it could not be written, and the reason if the
+  /// last write failed.
   void requireWritten() const;
   /// @throws std::runtime_error as `requireWritten`.
   void close();
@@ -35,7 +34,7 @@ class OutputFile {
   std::ofstream stream_;
 };
 
-/// poses.txt, TUM format. Without a pose there is no file.
+/// Writes poses.txt in TUM format. If there is no pose, there is no file.
 class PoseTextFile {
  public:
   explicit PoseTextFile(std::filesystem::path path) : path_(std::move(path)) {}
@@ -52,27 +51,25 @@ class PoseTextFile {
 void writeCamchain(const std::filesystem::path& folder, const Rig& rig);
 
 /// Writes a recording in a format of other tools, in constant memory. Results get their names when
-/// `close` is called; without it, nothing is left.
+/// `close` is called. If it is not called, nothing is left.
 class RecordingWriter {
  public:
   virtual ~RecordingWriter() = default;
 
   /// @param camera index in the rig.
-  /// @param events in time order, not before the camera's earlier ones. Times in ns of the
+  /// @param events in time order, not before the camera's earlier events. Times are in ns of the
   /// recording's clock, with the camera's time offset already added.
   virtual void addEvents(std::size_t camera, const std::vector<Event>& events) = 0;
   /// @param pose T_world_rig; poses come in time order.
   virtual void addPose(const StampedPose& pose) = 0;
-  /// Adds a depth map of camera 0: a float32 TIFF file in metres. Most formats have no place for
-  /// it.
+  /// Adds a depth map of camera 0: a float32 TIFF file in metres. Most formats ignore it.
   virtual void addTruth(std::int64_t /*t_ns*/, const std::filesystem::path& /*file*/) {}
-  /// Completes the files.
   virtual void close() = 0;
 };
 
-/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0);
-/// depth/ with the truth. What the recording lacks is left out.
-/// @param rig whose frame is that of camera 0.
+/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0); depth/ with
+/// the truth. Parts that the recording does not have are left out.
+/// @param rig rig whose frame is camera 0's frame.
 /// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
 std::unique_ptr<RecordingWriter> openFolderWriter(const std::filesystem::path& folder,
                                                   const Rig& rig);
@@ -81,21 +78,21 @@ std::unique_ptr<RecordingWriter> openFolderWriter(const std::filesystem::path& f
 /// index and checksums):
 ///   /camN/events       event_camera_msgs/EventPacket, encoding mono: the times are exact (ns), and
 ///                      event_camera_py and our reader decode it
-///   /camN/camera_info  sensor_msgs/CameraInfo, once, of a calibrated camera
+///   /camN/camera_info  sensor_msgs/CameraInfo, once, if the camera is calibrated
 ///   /pose              geometry_msgs/PoseStamped, T_world_rig
 /// The cameras' poses on the rig have no message: a rig of several cameras needs a calibration
 /// file. Times that a ROS message cannot hold (before 0, or from 2^31 s on), and rows above 32767,
 /// are errors.
-/// @param rig whose frame is that of the poses.
+/// @param rig rig whose frame is the poses' frame.
 std::unique_ptr<RecordingWriter> openMcapWriter(const std::filesystem::path& file, const Rig& rig);
 
 /// Writes a folder in DSEC's layout: events/left/events.h5, events/right/events.h5, further cameras
 /// events/cam2/events.h5, …; camchain.yaml; poses.txt (T_world_cam0, TUM). A file has /events/x and
 /// y (uint16), p (uint8), t (uint32, microseconds since /t_offset, the first event) and /ms_to_idx
 /// (uint64: the first event of each millisecond of t). Times that are not whole microseconds, or
-/// later than 2^32 microseconds (71 minutes) after the first one, are errors. Exists only in builds
-/// with HDF5.
-/// @param rig whose frame is that of camera 0.
+/// over 2^32 microseconds (71 minutes) after the first event, are errors. The function exists only
+/// in builds with HDF5.
+/// @param rig rig whose frame is camera 0's frame.
 /// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
 std::unique_ptr<RecordingWriter> openHdf5Writer(const std::filesystem::path& folder,
                                                 const Rig& rig);
