@@ -16,7 +16,7 @@ std::runtime_error wrongNpyHeader(const std::string& what) {
   return std::runtime_error("the array's header: " + what);
 }
 
-/// The dictionary; the data follow it.
+/// Returns the dictionary; the data follow it.
 std::string_view npyDictionaryOf(std::string_view bytes) {
   constexpr std::size_t kVersion = 6;
   if (!looksLikeNpy(bytes)) throw wrongNpyHeader("it does not begin as a NumPy array does");
@@ -36,7 +36,7 @@ std::string_view npyDictionaryOf(std::string_view bytes) {
   return bytes.substr(begin, length);
 }
 
-/// The text behind 'key': in the dictionary.
+/// Returns the text after 'key': in the dictionary.
 std::string_view npyValueOf(std::string_view dictionary, const std::string& key) {
   const std::size_t name = dictionary.find("'" + key + "'");
   const std::size_t colon =
@@ -45,7 +45,7 @@ std::string_view npyValueOf(std::string_view dictionary, const std::string& key)
   return trimmed(dictionary.substr(colon + 1));
 }
 
-/// The type of "<f4"; nothing where it is no number.
+/// Parses a type like "<f4"; std::nullopt if it is no number.
 std::optional<NpyField> npyTypeOf(std::string_view descr) {
   if (descr.size() != 3) return std::nullopt;
   const char order = descr[0];
@@ -66,7 +66,7 @@ std::runtime_error wrongNpyType(std::string_view descr) {
 constexpr std::size_t kMaxElementBytes = 65'536;
 
 /// Parses the list of fields of a structured type: [('x', '<u2'), ('', '|V2'), ('p', '|i1', (3,))].
-/// The fields of structures and arrays within have no use: their bytes are counted.
+/// Nested structures and arrays are not used: only their bytes are counted.
 class NpyFieldParser {
  public:
   explicit NpyFieldParser(std::string_view text) : text_(text), all_(text) {}
@@ -78,8 +78,8 @@ class NpyFieldParser {
   }
 
  private:
-  /// @param fields where the numbers are added; null: nowhere.
-  /// @return the bytes of all fields.
+  /// @param fields gets the fields that are numbers; null: they are not needed.
+  /// @return the size of all fields in bytes.
   std::size_t list(std::vector<NpyField>* fields, int depth) {
     constexpr int kMaxDepth = 8;
     if (depth > kMaxDepth) throw fail();
@@ -111,7 +111,7 @@ class NpyFieldParser {
     return bytes;
   }
 
-  /// A name, or a title and a name in brackets.
+  /// Takes a name, or a title and a name in brackets.
   std::string name() {
     if (!takes('(')) return std::string(quoted());
     quoted();
@@ -132,7 +132,7 @@ class NpyFieldParser {
     return text;
   }
 
-  /// The bytes of a type that is no number: "|V4", "<U8", "<M8[us]".
+  /// Returns the bytes of a type that is no number: "|V4", "<U8", "<M8[us]".
   std::size_t bytesOf(std::string_view type) const {
     if (type.size() < 3 || type[1] == 'O') throw wrongNpyType("'" + std::string(type) + "'");
     const auto bytes = parseNumber<std::size_t>(type.substr(2, type.find('[') - 2));
@@ -140,7 +140,7 @@ class NpyFieldParser {
     return *bytes * (type[1] == 'U' ? 4 : 1);
   }
 
-  /// "3", or "(2, 3)".
+  /// Takes the shape "3" or "(2, 3)" of a field and returns its number of elements.
   std::size_t arraySize() {
     const bool many = takes('(');
     std::size_t size = 1;
@@ -157,7 +157,7 @@ class NpyFieldParser {
     return size;
   }
 
-  /// The next character behind blanks.
+  /// Returns the next character after blanks.
   char next() {
     while (!text_.empty() && text_.front() == ' ') text_.remove_prefix(1);
     if (text_.empty()) throw fail();
@@ -201,7 +201,7 @@ std::vector<std::uint64_t> npyShapeOf(std::string_view text, std::size_t element
   if (text.empty() || text.front() != '(' || end == std::string_view::npos) throw refuse();
   constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 53;
   std::vector<std::uint64_t> shape;
-  std::uint64_t count = std::max<std::size_t>(1, element_bytes / 8);  // of 8 bytes
+  std::uint64_t count = std::max<std::size_t>(1, element_bytes / 8);  // in units of 8 bytes
   for (const std::string_view word : splitWords(text.substr(1, end - 1), " ,")) {
     const std::optional<std::uint64_t> size = parseNumber<std::uint64_t>(word);
     if (!size || *size > kMaxCount || (*size > 0 && count > kMaxCount / *size)) throw refuse();

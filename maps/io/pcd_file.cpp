@@ -97,8 +97,8 @@ std::uint64_t pointsOf(const HeaderLines& lines) {
   return points;
 }
 
-/// The origin of the points. Of a cloud with the fields of MapPoint, VIEWPOINT is this origin. In
-/// others it is the place of a sensor, and the points may be relative to anything.
+/// Returns the origin of the points. In a cloud with the fields of MapPoint, VIEWPOINT is this
+/// origin. Elsewhere it is a sensor's position, and points may be relative to anything.
 Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField>& fields) {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   const auto has = [&](const char* name) {
@@ -121,7 +121,7 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
                                  std::uint64_t points) {
   const auto is_padding = [](const RecordField& field) { return field.name == "_"; };
   fields.erase(std::remove_if(fields.begin(), fields.end(), is_padding),
-               fields.end());  // a compressed file does not hold it
+               fields.end());  // a compressed file has no padding
 
   if (scanner.left() < 8) scanner.refuse("expected the sizes of the compressed points, 8 bytes");
   const std::uint64_t packed_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
@@ -132,7 +132,7 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
                    std::to_string(points) + " points of " + std::to_string(record_bytes) +
                    " bytes");
   }
-  constexpr std::uint64_t kMaxRatio = 88;  // of LZF: 3 bytes hold 264 at most
+  constexpr std::uint64_t kMaxRatio = 88;  // of LZF: 3 bytes unpack to 264 at most
   if (scanner.left() < packed_bytes || plain_bytes > packed_bytes * kMaxRatio) {
     scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
                    std::to_string(packed_bytes) + " that decompress to " +

@@ -45,7 +45,7 @@ struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
   std::vector<RecordField> fields;
-  std::size_t list_line = 0;  ///< Number of the line with a list property; 0 without one.
+  std::size_t list_line = 0;  ///< Number of the line with a list property; 0: none.
 };
 
 struct PlyHeader {

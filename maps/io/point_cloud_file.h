@@ -13,17 +13,17 @@
 
 namespace efm {
 
-/// Writes a binary PCD file, whatever the extension of the path. Its fields are those of MapPoint,
-/// its VIEWPOINT is the cloud's `sensor_origin_`, which `readPointCloud` adds. An empty cloud is a
-/// valid file. The file appears when it is complete (AtomicFile).
+/// Writes a binary PCD file, whatever the extension of the path. Its fields are those of MapPoint.
+/// Its VIEWPOINT is the cloud's `sensor_origin_`, which `readPointCloud` adds to the points. An
+/// empty cloud makes a valid file. The file appears when it is complete (AtomicFile).
 void writePcd(const std::filesystem::path& path, const MapCloud& cloud);
 
 /// Red, green and blue.
 using PointColour = std::array<std::uint8_t, 3>;
 
 struct PointCloudContent {
-  std::vector<CloudPoint> points;  ///< In the order of the file.
-  std::uint64_t non_finite = 0;    ///< Points with a coordinate that is not finite: left out.
+  std::vector<CloudPoint> points;  ///< The points, in the order of the file.
+  std::uint64_t non_finite = 0;    ///< Number of points left out: a coordinate is not finite.
 };
 
 /// Reads a PCD file (ascii, binary or binary_compressed) or a PLY file (ascii or binary, either
@@ -36,7 +36,7 @@ PointCloudContent readPointCloud(const std::filesystem::path& path);
 /// Writes a binary PCD file, version 0.7.
 void writePcdTo(std::ostream& stream, const MapCloud& cloud);
 
-/// @throws std::runtime_error naming the line or byte, the value and the expected one.
+/// @throws std::runtime_error naming the line or byte, the value and the expected value.
 PointCloudContent parsePcd(std::string_view bytes);
 
 /// Writes a binary little-endian file of the Stanford polygon format, version 1.0, for viewers. Per

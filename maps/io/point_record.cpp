@@ -66,7 +66,7 @@ constexpr std::array<std::string_view, 4> kNames = {"x", "y", "z", "intensity"};
 
 using Values = std::array<double, 4>;
 
-/// The index of each of them among the fields of the file.
+/// The index of each of `kNames` among the fields of the file.
 using FieldIndices = std::array<std::optional<std::size_t>, 4>;
 
 FieldIndices findFields(const std::vector<RecordField>& fields) {

@@ -17,12 +17,12 @@ class TextScanner {
  public:
   explicit TextScanner(std::string_view bytes) : bytes_(bytes), rest_(bytes) {}
 
-  /// The next line, without its end ("\n" or "\r\n").
+  /// Takes the next line, without its end ("\n" or "\r\n").
   /// @param expected the content of the line, for the error message.
-  /// @throws std::runtime_error where the file ends before the line does. A last line without a
-  /// line break may be cut short.
+  /// @throws std::runtime_error if the file ends before the line: a last line without a line break
+  /// may be incomplete.
   std::string_view line(std::string_view expected);
-  /// The next bytes: this number of them, or all that are left.
+  /// Takes the next `bytes` bytes, or all bytes that are left.
   std::string_view take(std::size_t bytes);
 
   /// Number of bytes that are left.
@@ -32,7 +32,7 @@ class TextScanner {
 
   /// @throws std::runtime_error naming the next byte, counted from 0.
   [[noreturn]] void refuse(const std::string& why) const;
-  /// @throws std::runtime_error where anything but white space is left.
+  /// @throws std::runtime_error if anything but white space is left.
   void expectEnd() const;
 
  private:
@@ -48,11 +48,11 @@ struct WordLine {
 
   /// @throws std::runtime_error naming the line.
   [[noreturn]] void refuse(const std::string& why) const;
-  /// The word with this index as a whole number from 0 on.
+  /// Returns the word with this index as a whole number, 0 or more.
   std::uint64_t count(std::size_t word) const;
 };
 
-/// The words of `TextScanner::line`.
+/// Takes `TextScanner::line` and splits it.
 WordLine wordLine(TextScanner& scanner, std::string_view expected);
 
 /// One field of a point in a file: `count` numbers of one type.
@@ -65,14 +65,14 @@ struct RecordField {
 /// The order of the bytes of points.
 struct RecordOrder {
   bool big_endian = false;
-  bool by_field = false;  ///< The first field of all points, then the next; else point by point.
+  bool by_field = false;  ///< True: field by field, of all points. False: point by point.
 };
 
-/// Bytes of one point.
+/// Returns the bytes of one point.
 std::size_t bytesOf(const std::vector<RecordField>& fields);
 
-/// Reads `count` points: lines of numbers, blank lines aside, or records of `bytesOf(fields)`
-/// bytes. The rest of the file is left to the caller.
+/// These functions read `count` points: lines of numbers (blank lines are skipped), or records of
+/// `bytesOf(fields)` bytes. The rest of the file is left to the caller.
 PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                   std::uint64_t count);
 PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
