@@ -26,11 +26,11 @@ constexpr std::size_t kMinPoints = 50;
 constexpr std::size_t kMaxCompared = 20'000;
 constexpr int kNormalNeighbors = 12;  // about two rings around a point of a grid
 constexpr int kMaxRounds = 200;
-/// A round that moves less than this is the last: far below what a map's points differ by.
+/// A round that moves less than this is the last round. It is far below the errors of map points.
 constexpr double kLastStepM = 1e-5;
 constexpr double kLastStepRad = 1e-6;
 
-/// ICP that tells which points it used.
+/// ICP that gives access to the points that it used.
 struct Icp : pcl::IterativeClosestPoint<PclPoint, PclPoint, double> {
   const pcl::Correspondences& used() const { return *correspondences_; }
 };
@@ -44,13 +44,13 @@ std::runtime_error undetermined() {
 using PointToPlane =
     pcl::registration::TransformationEstimationPointToPlaneLLS<PclPoint, PclPoint, double>;
 
-/// A step of ICP that is not finite would end the process in the next search.
+/// Rejects a step of ICP that is not finite: it would end the process in the next search.
 struct CheckedPointToPlane : PointToPlane {
   using PointToPlane::estimateRigidTransformation;
   void estimateRigidTransformation(const PclCloud& map, const PclCloud& truth,
                                    const pcl::Correspondences& pairs,
                                    Eigen::Matrix4d& T_next_map) const override {
-    constexpr double kMaxStepM = 1e9;  // 200 of them squared are still a float
+    constexpr double kMaxStepM = 1e9;  // the square of 200 such steps is still a finite float
     PointToPlane::estimateRigidTransformation(map, truth, pairs, T_next_map);
     if (!T_next_map.allFinite() || T_next_map.cwiseAbs().maxCoeff() > kMaxStepM) {
       throw undetermined();
@@ -69,7 +69,7 @@ PclCloud::Ptr pclCloudOf(const std::vector<Eigen::Vector3f>& points, std::size_t
   return cloud;
 }
 
-/// The normal of the plane through the nearest points, of either sign.
+/// Sets each normal to the normal of the plane through the nearest points, with any sign.
 void addNormals(const PclCloud::Ptr& cloud) {
   pcl::KdTreeFLANN<PclPoint> tree(false);
   tree.setInputCloud(cloud);
@@ -83,10 +83,10 @@ void addNormals(const PclCloud::Ptr& cloud) {
   }
 }
 
-/// How well distances along the normals determine a motion: the least mean square of the distance
-/// that a motion of the cloud makes, for the motion of unit length that makes the least. Rotations
-/// count by their displacement at the cloud's mean radius. 1/3 for a sphere's translation, 0 for
-/// one wall.
+/// Returns how well distances along the normals determine a motion. A motion of unit length changes
+/// the distances by some mean square; the result is the smallest mean square of all such motions. A
+/// rotation is measured by its displacement at the cloud's mean radius. The result is 1/3 for a
+/// sphere's translation and 0 for one wall.
 double leastDistance(const PclCloud& cloud, const pcl::Indices& indices) {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const int i : indices) centre += cloud[i].getVector3fMap().cast<double>();
@@ -139,20 +139,20 @@ CloudAlignment alignCloud(const std::vector<CloudPoint>& map,
   icp.setInputTarget(surfaces);
   icp.setTransformationEstimation(pcl::make_shared<CheckedPointToPlane>());
   auto within = pcl::make_shared<pcl::registration::CorrespondenceRejectorMedianDistance>();
-  within->setMedianFactor(9);  // of squared distances
+  within->setMedianFactor(9);  // factor of squared distances: 3 of distances
   icp.addCorrespondenceRejector(within);
   icp.setMaximumIterations(kMaxRounds);
   icp.setTransformationEpsilon(kLastStepM * kLastStepM);
   icp.setTransformationRotationEpsilon(std::cos(kLastStepRad));
   icp.getConvergeCriteria()->setFailureAfterMaximumIterations(true);
-  icp.getConvergeCriteria()->setAbsoluteMSE(0);  // the steps alone decide
+  icp.getConvergeCriteria()->setAbsoluteMSE(0);  // only the size of a step ends ICP
   PclCloud moved;
   icp.align(moved);
   const Eigen::Matrix4d T_offset = icp.getFinalTransformation();
   pcl::Indices matched;
   for (const pcl::Correspondence& pair : icp.used()) matched.push_back(pair.index_match);
-  // One wall has the noise of its normals: 0.02 rad make 4e-4. Rooms and streets have 0.03 and
-  // more.
+  // One wall is not exactly 0, because its normals are noisy: 0.02 rad give 4e-4. Rooms and streets
+  // have 0.03 and more.
   constexpr double kMinDistance = 2e-3;
   if (leastDistance(*surfaces, matched) < kMinDistance) throw undetermined();
   if (!icp.hasConverged()) {

@@ -17,17 +17,17 @@ namespace efm {
 
 /// A map aligned with the truth.
 struct CloudAlignment {
-  Rigid3 T_truth_map;           ///< From the map's frame to the truth's.
-  std::size_t points = 0;       ///< Of the map that were compared with the truth.
-  std::size_t points_used = 0;  ///< Of these, the ones near enough in the last round.
+  Rigid3 T_truth_map;           ///< Maps the map's frame to the truth's frame.
+  std::size_t points = 0;       ///< Points of the map that were compared with the truth.
+  std::size_t points_used = 0;  ///< Compared points that were near enough in the last round.
 };
 
 /// Finds the rigid transform that brings a map onto the true surfaces, with PCL's ICP: distances
 /// along the truth's normals (Chen and Medioni, Image and Vision Computing 1992). Starts from the
-/// identity. In each round it uses the points whose distance is within three times the median. Of a
-/// large map, every n-th point is compared, 20,000 at least.
-/// @throws std::runtime_error saying what was expected: where a cloud has too few points, where the
-/// surfaces do not determine all six coordinates (a single wall), or where ICP does not converge.
+/// identity. In each round it uses the points whose distance is within three times the median. A
+/// large map is subsampled: every n-th point is compared, at least 20,000 points.
+/// @throws std::runtime_error that names the expected input: if a cloud has too few points, if the
+/// surfaces do not determine all six coordinates (a single wall), or if ICP does not converge.
 CloudAlignment alignCloud(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth);
 
 struct CloudEvaluationOptions {
@@ -43,19 +43,19 @@ struct CloudEvaluation {
   std::optional<CloudAlignment> alignment;
 };
 
-/// Compares a map with the truth: PCD or PLY files, or a run's folder (its map.pcd or points.pcd)
-/// and a dataset's (its gt_cloud.ply).
+/// Compares a map with the truth. Both are PCD or PLY files. A folder of a run stands for its
+/// map.pcd or points.pcd, a folder of a dataset for its gt_cloud.ply.
 CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const CloudEvaluationOptions& options);
 
 std::string evaluationTable(const CloudEvaluation& evaluation);
-/// `cloudEvaluationKeys` describes the keys.
+/// Returns the errors as JSON. `cloudEvaluationKeys` describes the keys.
 std::string evaluationJson(const CloudEvaluation& evaluation);
-/// The keys of the JSON, for the program's help.
+/// Returns the description of the JSON's keys, for the program's help.
 std::string cloudEvaluationKeys();
 
-/// Accuracy, completeness and F1 over the distance.
+/// Draws accuracy, completeness and F1 over the distance.
 cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation);
 
 }  // namespace efm

@@ -55,7 +55,7 @@ void pairSeries(const std::vector<TimedFile>& estimates, const std::vector<Timed
 }
 
 /// Compares one map after the other.
-/// @return whether there is a pixel with both depths.
+/// @return true if at least one pixel has an estimated and a true depth.
 bool compare(DepthEvaluation& evaluation, const cv::Mat1b& mask,
              const DepthEvaluationOptions& options) {
   std::vector<DepthPair> all;
@@ -93,7 +93,7 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
   for (const fs::path& path : {estimated, truth}) {
     if (!fs::exists(path)) throw std::runtime_error("no such file: " + path.string());
   }
-  // Compared with a file, the folder of one depth map counts as its file.
+  // If the truth is a file, the folder of one depth map stands for the map's file.
   const bool one_map = fs::exists(estimated / "depth.tiff") && !fs::is_directory(truth);
   const fs::path estimate = one_map ? estimated / "depth.tiff" : estimated;
   const bool folders = fs::is_directory(estimate);
@@ -130,7 +130,7 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
 
 namespace {
 
-/// The file of that name in a folder or in one of `levels` folders above it.
+/// Returns the file of that name in a folder or in one of `levels` folders above this folder.
 std::optional<fs::path> fileAtOrAbove(const fs::path& path, const std::string& name, int levels) {
   fs::path folder = fs::absolute(path).lexically_normal();
   for (int level = 0; level <= levels; ++level) {
@@ -140,7 +140,7 @@ std::optional<fs::path> fileAtOrAbove(const fs::path& path, const std::string& n
   return std::nullopt;
 }
 
-/// Nothing if the file is not the report of a run.
+/// Returns std::nullopt if the file is not the report of a run.
 std::optional<StereoBaseline> fromReport(const fs::path& file) {
   using Pointer = nlohmann::json::json_pointer;
   std::ifstream stream(file);
@@ -176,7 +176,7 @@ namespace {
 /// A field of DepthErrors in the tables and in the JSON.
 struct Measure {
   const char* key;
-  const char* name;  ///< In the tables, as the unit, factor and decimals.
+  const char* name;  ///< Name in the tables. Unit, factor and decimals are also for tables.
   const char* unit;
   std::optional<double> (*value)(const DepthErrors&);
   double factor;
@@ -262,7 +262,7 @@ EvaluationJson asJson(const DepthEvaluation& evaluation,
   return json;
 }
 
-/// A line per map, with the measures `of_each_map`.
+/// Returns a table with a line per map, which has the measures `of_each_map`.
 std::string mapsTable(const EvaluationJson& maps) {
   std::vector<TableColumn> columns = {{"map", "name"}, {"points", "points"}};
   TableRow names = {"map", "points"};
@@ -270,7 +270,7 @@ std::string mapsTable(const EvaluationJson& maps) {
   for (const Measure& measure : kMeasures) {
     if (!measure.of_each_map) continue;
     columns.push_back(measure.column());
-    // "bad-pix 5px,5%" takes two lines of the heading, and so do all.
+    // "bad-pix 5px,5%" needs two lines in the heading, so every name gets two lines.
     const std::string name = std::string(measure.name) + " ";
     const std::size_t blank = name.find(' ');
     names.push_back(name.substr(0, blank));
@@ -282,7 +282,7 @@ std::string mapsTable(const EvaluationJson& maps) {
   return tableText(rows);
 }
 
-/// A line per measure.
+/// Returns a table with a line per measure.
 std::string measuresTable(const EvaluationJson& json) {
   std::vector<TableRow> rows = {{"", "mean of maps", "all points"}};
   rows.push_back({"points", "", json["all"]["points"].dump()});
@@ -372,7 +372,7 @@ const EvaluatedMap& typicalMap(const DepthEvaluation& evaluation) {
   return *upperMedian(maps, fewer);
 }
 
-/// The range from the 1st to the 99th percentile.
+/// Returns the range from the 1st to the 99th percentile.
 AxisRange usualRange(const std::vector<double>& values, AxisScale scale) {
   if (values.empty()) return rangeAround({1}, scale);
   AxisRange range{quantileOf(values, 0.01), quantileOf(values, 0.99), scale};
@@ -384,7 +384,7 @@ cv::Mat3b depthImages(const EvaluatedMap& map, const DepthEvaluationOptions& opt
   const ComparedDepths depths = readDepths(map, maskOf(options), options);
   const cv::Size size = depths.truth.size();
   cv::Mat1f estimate(size, kNone), truth(size, kNone), error(size, kNone);
-  std::vector<double> depths_m, errors_m;  // of the truth, of the estimate
+  std::vector<double> depths_m, errors_m;  // true depths, errors of the estimate
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       if (depths.hasTruth(y, x, options.pairing)) {
@@ -418,7 +418,7 @@ cv::Mat3b detectionPlot(const PrecisionRecall& detection) {
   return drawCurves(plot);
 }
 
-/// The errors of each map over its time in the recording.
+/// Draws the errors of each map over its time in the recording.
 cv::Mat3b errorsOverTime(const std::vector<EvaluatedMap>& maps) {
   const std::int64_t start_ns = parseSeconds(maps.front().name).value_or(0);
   std::vector<cv::Point2d> means;

@@ -17,9 +17,9 @@ struct DepthEvaluationOptions {
   DepthPairingOptions pairing;
   /// Focal length in pixels times baseline in metres, for bad-pix.
   std::optional<double> focal_baseline;
-  std::optional<double> png_scale;  ///< Of 16-bit PNG, see `readDepthFile`.
-  std::filesystem::path mask;       ///< Only its pixels count. Empty: all pixels.
-  std::vector<double> thresholds_m = defaultDepthThresholds();  ///< Of precision, recall and F1.
+  std::optional<double> png_scale;  ///< Scale of 16-bit PNG files, see `readDepthFile`.
+  std::filesystem::path mask;       ///< Mask of the compared pixels. Empty: all pixels.
+  std::vector<double> thresholds_m = defaultDepthThresholds();  ///< For precision, recall, F1.
 };
 
 /// The errors of one depth map.
@@ -33,50 +33,50 @@ struct EvaluatedMap {
 /// The errors of depth maps against their truth.
 struct DepthEvaluation {
   std::vector<EvaluatedMap> maps;
-  /// Mean over the maps with points, each map with the same weight. `points` is their sum.
+  /// Mean over the maps with points, each map with the same weight. `points` is the sum.
   DepthErrors mean;
-  DepthErrors all;                     ///< Over all points of all maps.
-  PrecisionRecall detection;           ///< Over all pixels of all maps.
+  DepthErrors all;                     ///< Errors over all points of all maps.
+  PrecisionRecall detection;           ///< Precision and recall over all pixels of all maps.
   std::uint64_t without_truth = 0;     ///< Estimated maps without truth within 1 ms.
   std::uint64_t without_estimate = 0;  ///< True maps without estimate.
 };
 
-/// Compares two files (`readDepthFile`; a folder with a depth.tiff counts as this file) or two
-/// folders (`depthSeries`). Each map of a folder is paired with the truth nearest in time, within
-/// 1 ms.
+/// Compares two files (`readDepthFile`; a folder with a depth.tiff stands for this file) or two
+/// folders (`depthSeries`). Each map of a folder is paired with the true map that is nearest in
+/// time, at most 1 ms away.
 DepthEvaluation evaluateDepth(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const DepthEvaluationOptions& options);
 
 /// A rectified stereo pair: the disparity of a depth Z is focal_px * baseline_m / Z pixels.
 struct StereoBaseline {
-  double focal_px = 0;    ///< Above 0.
-  double baseline_m = 0;  ///< Above 0.
-  std::string source;     ///< The file of both values, or "as given". For tables.
+  double focal_px = 0;    ///< Focal length, above 0.
+  double baseline_m = 0;  ///< Distance of the cameras, above 0.
+  std::string source;     ///< The file of both values, or "as given". Tables show it.
 };
 
 /// Reads the stereo pair from the report.json of the run that wrote the estimate, in `estimate` or
 /// up to three folders above it. Otherwise reads it from the camchain.yaml of the truth's dataset,
 /// in `truth` or up to two folders above it: camera 0's fx and its distance to camera 1.
-/// @return nothing if neither file has it.
+/// @return std::nullopt if neither file has the stereo pair.
 std::optional<StereoBaseline> findStereoBaseline(const std::filesystem::path& estimate,
                                                  const std::filesystem::path& truth);
 
-/// Tables of at most 80 columns. Of several maps: a line per map with the main measures. Then a
-/// line per measure, with the mean of the maps and the value of all points; precision, recall and
-/// F1 over the thresholds, the maps without partner, and the focal length and baseline of bad-pix.
+/// Returns tables of at most 80 columns: if there are several maps, a line per map; a line per
+/// measure, with the mean of the maps and the value of all points; precision, recall and F1 over
+/// the thresholds; maps without a partner; focal length and baseline of bad-pix.
 std::string evaluationTable(const DepthEvaluation& evaluation,
                             const std::optional<StereoBaseline>& stereo = std::nullopt);
 
-/// `depthEvaluationKeys` describes the keys.
+/// Returns the errors as JSON. `depthEvaluationKeys` describes the keys.
 std::string evaluationJson(const DepthEvaluation& evaluation,
                            const std::optional<StereoBaseline>& stereo = std::nullopt);
 
-/// The keys of the JSON, for the program's help.
+/// Returns the description of the JSON's keys, for the program's help.
 std::string depthEvaluationKeys();
 
-/// Draws estimate, truth and error of one map side by side: of several maps the one with the median
-/// number of points. Below: precision, recall and F1 over the threshold and, for several maps,
+/// Draws estimate, truth and error of one map side by side: the map with the median number of
+/// points. Below are precision, recall and F1 over the threshold and, if there are several maps,
 /// their errors over time. Reads the files of the drawn map again.
 /// @throws std::runtime_error as `evaluateDepth` does.
 cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options);

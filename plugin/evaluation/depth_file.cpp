@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The maximum width and height of a PFM or NumPy image. More means a damaged header.
+/// The maximum width and height of a PFM or NumPy image. A larger value means a damaged header.
 constexpr std::uint64_t kMaxImageSide = 65535;
 
 std::string kindOf(const cv::Mat& image) {
@@ -77,7 +77,7 @@ cv::Size imageSizeOf(const NpyHeader& header) {
   return {static_cast<int>(header.shape[1]), static_cast<int>(header.shape[0])};
 }
 
-/// The image of a NumPy array (`parseNpyHeader`): two dimensions, [row][column], float32 or
+/// Returns the image of a NumPy array (`parseNpyHeader`): two dimensions, [row][column], float32 or
 /// float64 of either byte order, in C order. Doubles are rounded to float.
 cv::Mat1f parseNpy(std::string_view bytes) {
   const NpyHeader header = parseNpyHeader(bytes);
@@ -111,15 +111,15 @@ int side(const WordLine& line, std::size_t word) {
   return static_cast<int>(pixels);
 }
 
-/// Whether these are the first bytes of a PFM ("portable float map", Debevec), grey or coloured.
+/// Returns whether bytes begin like a PFM ("portable float map", Debevec), grey or coloured.
 bool looksLikePfm(std::string_view bytes) {
   return bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == 'f' || bytes[1] == 'F') &&
          (bytes[2] == '\n' || bytes[2] == '\r' || bytes[2] == ' ');
 }
 
-/// The image of a grey PFM: lines "Pf", "width height" and "scale", then float32 rows from the
-/// bottom upwards, little endian if the scale is negative. As in stereo benchmarks (Middlebury),
-/// the size of the scale has no effect. (OpenCV's reader divides by it and refuses CRLF line ends.)
+/// Reads a grey PFM: lines "Pf", "width height" and "scale", then float32 rows from the bottom
+/// upwards, little endian if the scale is negative. As in stereo benchmarks (Middlebury), the size
+/// of the scale has no effect. (OpenCV's reader divides by the scale and rejects CRLF line ends.)
 cv::Mat1f parsePfm(std::string_view bytes) {
   TextScanner cursor(bytes);
   const WordLine kind = wordLine(cursor, "Pf");
@@ -176,10 +176,10 @@ cv::Mat1f readDepthFile(const fs::path& file, std::optional<double> png_scale) {
 
 cv::Mat1b readMaskFile(const fs::path& file) {
   try {
-    // The maximum of the colours: OpenCV's conversion to grey rounds a dark blue to black.
+    // The maximum of the colours is used: OpenCV's conversion to grey rounds a dark blue to black.
     const cv::Mat channels = decodePicture(readBytes(file));
     cv::Mat1b mask(channels.size(), uchar{0});
-    for (int c = 0; c < std::min(channels.channels(), 3); ++c) {  // the fourth is opacity
+    for (int c = 0; c < std::min(channels.channels(), 3); ++c) {  // the fourth channel is opacity
       cv::Mat one;
       cv::extractChannel(channels, one, c);
       mask |= one > 0;
@@ -205,7 +205,7 @@ fs::path fileInFolder(const fs::path& path, std::initializer_list<const char*> n
 
 namespace {
 
-/// <t>/depth.tiff
+/// Returns the files <t>/depth.tiff.
 std::vector<TimedFile> keyframesIn(const fs::path& folder) {
   std::vector<TimedFile> maps;
   const fs::path keyframes = folder / "keyframes";
@@ -218,7 +218,7 @@ std::vector<TimedFile> keyframesIn(const fs::path& folder) {
   return maps;
 }
 
-/// Files with their time in the name, like "1.25.tiff" or "cam0_1.25.tiff".
+/// Returns files with their time in the name, like "1.25.tiff" or "cam0_1.25.tiff".
 std::vector<TimedFile> namedIn(const fs::path& folder) {
   const std::set<std::string> extensions = {".tiff", ".tif", ".pfm", ".npy", ".png"};
   std::vector<TimedFile> maps;

@@ -21,14 +21,14 @@ inline std::string jsonText(const EvaluationJson& json) {
   return json.dump(2, ' ', false, EvaluationJson::error_handler_t::replace) + "\n";
 }
 
-/// A column of a table: the values of a key, numbers times a factor.
+/// A column of a table: the values of one key. Numbers are multiplied by a factor.
 struct TableColumn {
   const char* name;
   const char* key;
   int decimals = 0;
   double factor = 1;
 
-  /// @return "-" if the object has no such key.
+  /// Returns the text of the object's value, "-" if the object does not have the key.
   std::string textIn(const EvaluationJson& object) const {
     const auto found = object.find(key);
     if (found == object.end()) return "-";
@@ -39,8 +39,8 @@ struct TableColumn {
 
 using TableRow = std::vector<std::string>;
 
-/// A table as plain text, with two blanks between columns and none at the end of a line. The first
-/// column is aligned left, the others right. Missing cells stay empty.
+/// Returns a table as plain text, with two blanks between columns and no blanks at the end of a
+/// line. The first column is aligned left, the other columns right. Missing cells stay empty.
 inline std::string tableText(const std::vector<TableRow>& rows) {
   std::vector<std::size_t> widths;
   for (const TableRow& row : rows) {
@@ -60,7 +60,7 @@ inline std::string tableText(const std::vector<TableRow>& rows) {
   return text;
 }
 
-/// A heading, then a row per object of a list.
+/// Returns a heading and then a row per object of a list.
 inline std::vector<TableRow> tableRows(const std::vector<TableColumn>& columns,
                                        const EvaluationJson& objects) {
   std::vector<TableRow> rows(1 + objects.size());
@@ -73,7 +73,7 @@ inline std::vector<TableRow> tableRows(const std::vector<TableColumn>& columns,
   return rows;
 }
 
-/// Fractions, in percent, over a distance or an error in metres.
+/// Returns a plot of fractions, in percent, over a distance or an error in metres.
 /// @param steps a list of objects.
 /// @param x_key the key of the metres.
 /// @param fractions key and label of each curve.

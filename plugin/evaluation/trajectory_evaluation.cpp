@@ -27,8 +27,8 @@ constexpr double kDegrees = 180 / kPi;
 constexpr NamedChoice<Unit> kSpacingUnits[] = {
     {Unit::kFrames, "frames"}, {Unit::kMetres, "m"}, {Unit::kSeconds, "s"}};
 
-/// One frame as in evo, one second as in Sturm et al. 2012, and the fractions of the length of
-/// rpg_trajectory_evaluation.
+/// Returns one frame as in evo, one second as in Sturm et al. 2012, and fractions of the length as
+/// in rpg_trajectory_evaluation.
 std::vector<RelativeSpacing> usualSpacings(double true_length_m) {
   std::vector<RelativeSpacing> spacings = {{Unit::kFrames, 1}, {Unit::kSeconds, 1}};
   if (!(true_length_m > 0)) return spacings;
@@ -88,7 +88,7 @@ EvaluationJson asJson(const TrajectoryEvaluation& evaluation) {
   return json;
 }
 
-/// What the alignment does, and the transform that it found.
+/// Describes the alignment and the transform that it found.
 std::string alignmentText(const TrajectoryEvaluation& evaluation) {
   const std::string name =
       "alignment  " + std::string(nameIn(kTrajectoryAlignments, evaluation.alignment)) + ": ";
@@ -207,7 +207,7 @@ std::string trajectoryEvaluationKeys() {
 
 namespace {
 
-/// The two axes of largest extent.
+/// Returns the two axes on which the path has its largest extents.
 std::pair<int, int> widestAxes(const std::vector<PosePair>& pairs) {
   Eigen::Vector3d low = pairs.front().T_world_rig.translation;
   Eigen::Vector3d high = low;
@@ -215,7 +215,7 @@ std::pair<int, int> widestAxes(const std::vector<PosePair>& pairs) {
     low = low.cwiseMin(pair.T_world_rig.translation);
     high = high.cwiseMax(pair.T_world_rig.translation);
   }
-  int narrowest = 2;  // z if extents are equal: the view from above
+  int narrowest = 2;  // z, the view from above, if extents are equal
   for (const int axis : {1, 0}) {
     if (high[axis] - low[axis] < high[narrowest] - low[narrowest]) narrowest = axis;
   }

@@ -14,7 +14,7 @@
 
 namespace efm {
 
-/// The names on the command line and in the JSON.
+/// Names of the alignments on the command line and in the JSON.
 inline constexpr NamedChoice<TrajectoryAlignment> kTrajectoryAlignments[] = {
     {TrajectoryAlignment::kSe3, "se3"},
     {TrajectoryAlignment::kOrigin, "origin"},
@@ -24,8 +24,8 @@ struct TrajectoryEvaluationOptions {
   /// Maximum time between the two poses of a pair, from 0. Default: 0.01 s, as in evo.
   double max_difference_s = 0.01;
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
-  /// Of the relative errors. Empty: one frame, one second, and 10 to 50 % of the true length, as in
-  /// rpg_trajectory_evaluation.
+  /// Spacings of the relative errors. Empty: one frame, one second, and 10 to 50 % of the true
+  /// length, as in rpg_trajectory_evaluation.
   std::vector<RelativeSpacing> spacings;
 };
 
@@ -39,33 +39,33 @@ struct EvaluatedSpacing {
 struct TrajectoryEvaluation {
   std::filesystem::path estimate_file;
   std::filesystem::path truth_file;
-  std::uint64_t estimate_poses = 0;  ///< In the files.
+  std::uint64_t estimate_poses = 0;  ///< Number of poses in the file.
   std::uint64_t truth_poses = 0;
-  double max_difference_s = 0;  ///< Of the options.
-  std::vector<PosePair> pairs;  ///< In the order of time.
+  double max_difference_s = 0;  ///< Copied from the options.
+  std::vector<PosePair> pairs;  ///< Pairs of poses in the order of time.
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
   Rigid3 T_world_map;        ///< Aligns the estimate with the truth.
-  PoseErrors errors;         ///< Absolute, of each pair.
-  double true_length_m = 0;  ///< Of the path through the pairs.
+  PoseErrors errors;         ///< Absolute errors, one per pair.
+  double true_length_m = 0;  ///< Length of the true path through the pairs.
   std::vector<EvaluatedSpacing> relative;
 };
 
-/// Compares a trajectory with the truth: TUM files, or the folder of a run (its trajectory.txt) or
-/// of a dataset (its poses.txt or groundtruth.txt).
+/// Compares a trajectory with the truth. Both are TUM files. A folder of a run stands for its
+/// trajectory.txt, a folder of a dataset for its poses.txt or groundtruth.txt.
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options);
 
-/// What was compared (files, pairs, times, alignment), then the errors; at most 80 columns, but for
-/// long file names.
+/// Returns text that names the compared files, pairs, times and the alignment, and then the errors.
+/// Lines have at most 80 columns; long file names may exceed them.
 std::string evaluationTable(const TrajectoryEvaluation& evaluation);
-/// `trajectoryEvaluationKeys` describes the keys.
+/// Returns the errors as JSON. `trajectoryEvaluationKeys` describes the keys.
 std::string evaluationJson(const TrajectoryEvaluation& evaluation);
-/// The keys of the JSON, for the program's help.
+/// Returns the description of the JSON's keys, for the program's help.
 std::string trajectoryEvaluationKeys();
 
 /// Draws both trajectories, with the estimate aligned, and the absolute errors over time. The view
-/// is along the axis of the truth's smallest extent: from above if two are equal.
+/// is along the axis on which the truth's extent is smallest; if extents are equal, from above.
 cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation);
 
 }  // namespace efm
