@@ -34,8 +34,8 @@ namespace {
 using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 
-/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
-/// @param sigma standard deviation of depth of each point, metres; empty: not known.
+/// Returns the points with a confidence. (MRPT's clouds may also have points of intensity 0.)
+/// @param sigma standard deviation of the depth of each point, metres; empty: not known.
 std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI& cloud,
                                                            const std::vector<float>& sigma = {}) {
   const auto& x = cloud.getPointsBufferRef_x();
@@ -52,13 +52,13 @@ std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI&
   return points;
 }
 
-/// A keyframe from an observation of a point cloud with intensities.
-/// @return nothing for other observations.
+/// Returns a keyframe from an observation of a point cloud with intensities.
+/// @return std::nullopt for other observations.
 std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
                                            const Rigid3& T_world_rig) {
   const auto* seen = dynamic_cast<const CObservationPointCloud*>(&observation);
   if (!seen) return std::nullopt;
-  seen->load();  // its points may be in an external file
+  seen->load();  // the points may be in an external file
   const auto cloud = std::dynamic_pointer_cast<CPointsMapXYZI>(seen->pointcloud);
   if (!cloud) return std::nullopt;
   const std::int64_t t_ns =
@@ -66,7 +66,7 @@ std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observ
   return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), viewPointsOf(*cloud)};
 }
 
-/// MRPT reads these keys for every map, from a section of its own.
+/// Rejects unknown keys in the section that MRPT reads for every map.
 void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
   constexpr std::array<std::string_view, 3> kKnown = {
       "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
@@ -78,7 +78,7 @@ void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::st
   }
 }
 
-/// Maps of version 0 had no consistency check.
+/// Reads the options of the consistency check. Maps of version 0 had no such check.
 void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
                      ConsistencyOptions& options) {
   options.consistency = Consistency::kNone;
@@ -89,7 +89,7 @@ void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
   options.max_contradictions = in.ReadAs<std::int32_t>();
 }
 
-/// Maps of versions 0 and 1 had no sigma.
+/// Reads the points of a keyframe. Maps of versions 0 and 1 had no sigma.
 std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CArchive& in,
                                                          std::uint8_t version) {
   CPointsMapXYZI cloud;
@@ -103,7 +103,7 @@ std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CA
   return viewPointsOf(cloud, sigma);
 }
 
-/// Empty where none is known: a simplemap has no place for it.
+/// Returns the sigma of each point. Empty if none is known, because a simplemap cannot store sigma.
 std::vector<float> sigmaOf(const std::vector<ViewPoint>& points) {
   std::vector<float> sigma;
   bool is_known = false;
@@ -291,7 +291,7 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
   out.WriteAs<std::int32_t>(options.consistency.max_contradictions);
   out.WriteAs<std::uint32_t>(keyframes_.size());
   for (const StoredKeyframe& keyframe : keyframes_) {
-    // Not as a pose of MRPT: its conversion changes the last digit.
+    // Numbers instead of a pose of MRPT: MRPT's conversion changes the last digit.
     const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
@@ -362,7 +362,7 @@ void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) con
   out.insert(drawn);
 }
 
-/// Once.
+/// Warns once.
 void CEventFusionMap::warnOfRounding(const MapCloud& points) const {
   if (warned_of_rounding_) return;
   const auto warning = roundingWarning(points, cloud_.options().voxel_size_m);

@@ -21,28 +21,28 @@
 
 namespace efm {
 
-/// The points as float32 in the world, as MRPT has points.
+/// Converts points to MRPT's form: float32, frame `world`.
 mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud);
 
-/// A warning where this rounds them by more than a tenth of a voxel.
+/// Returns a warning if `pointsMapOf` rounds points by more than a tenth of a voxel.
 std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_size_m);
 
-/// The points of a keyframe in frame `ref`, float, intensity = confidence.
+/// Returns the points of a keyframe in frame `ref`, float, intensity = confidence.
 mrpt::maps::CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe);
 /// Adds the keyframe to a simplemap in MRPT's own classes, for any MRPT program: the view's pose in
-/// the world without covariance, and a frame with one CObservationPointCloud. Its label is
-/// "keyframe", its time t_ref (rounded to MRPT's tick), its sensor pose the identity.
+/// the world without covariance, and a frame with one CObservationPointCloud. The observation has
+/// the label "keyframe", the time t_ref (rounded to MRPT's tick) and the identity as sensor pose.
 /// @param cloud see `cloudOf`.
 void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
                 const mrpt::maps::CPointsMapXYZI::Ptr& cloud);
-/// The keyframes of a simplemap. A frame may have several.
+/// Returns the keyframes of a simplemap. A frame may have several keyframes.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
 /// Writes a simplemap of keyframes.
 void writeSimpleMap(const std::filesystem::path& file,
                     const std::vector<StoredKeyframe>& keyframes);
 
-/// The global cloud as a metric map of MRPT. MRPT's map factory makes it from an .ini; it takes the
-/// keyframes' clouds of a simplemap, and it can be stored and drawn. Not thread-safe.
+/// The global cloud as a metric map of MRPT. MRPT's map factory makes the map from an .ini. The map
+/// takes the keyframes' clouds of a simplemap, and it can be stored and drawn. Not thread-safe.
 ///
 ///     [<section>]
 ///     eventFusionMap_count = 1
@@ -54,19 +54,19 @@ void writeSimpleMap(const std::filesystem::path& file,
 /// A CObservationPointCloud with intensities (CPointsMapXYZI) is inserted as a keyframe with
 /// intensity = confidence. Other observations are ignored.
 ///
-/// The map also keeps its keyframes. Only they are stored, and reading inserts them again. So a
-/// stored map is the same bit for bit, and further keyframes have the same effect.
+/// The map also keeps its keyframes. A stored map contains only the keyframes, and reading inserts
+/// them again. So a map that was read is the same, bit for bit, also after further keyframes.
 class CEventFusionMap : public mrpt::maps::CMetricMap {
   DEFINE_SERIALIZABLE(CEventFusionMap, efm)
 
  public:
   explicit CEventFusionMap(const GlobalCloudOptions& options = {});
 
-  /// @throws std::invalid_argument if a point is not finite, its confidence is below 0, or it lies
+  /// @throws std::invalid_argument if a point is not finite, has a confidence below 0 or lies
   /// outside the range of voxel indices. Nothing is inserted then.
   void insertKeyframe(const StoredKeyframe& keyframe);
   /// Moves a keyframe to another pose: removes it and inserts it again.
-  /// @param keyframe its index in `keyframes`.
+  /// @param keyframe index in `keyframes`.
   /// @throws std::invalid_argument as `insertKeyframe` does. The keyframe does not move then.
   void moveKeyframe(std::size_t keyframe, const Rigid3& T_world_ref);
 
@@ -75,12 +75,12 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
 
   bool isEmpty() const override;
   std::string asString() const override;
-  /// The exported points, coloured by their confidence.
+  /// Draws the exported points, coloured by their confidence.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
   /// Writes "<prefix>.pcd".
   void saveMetricMapRepresentationToFile(const std::string& prefix) const override;
-  /// The exported points. The map owns them, and they change with it. Where floats are too coarse
-  /// for them, MRPT's log has a warning.
+  /// Returns the exported points. The map owns the result and changes it when the map changes. If
+  /// floats are too coarse for the points, MRPT's log has a warning.
   const mrpt::maps::CSimplePointsMap* getAsSimplePointsMap() const override;
   using CMetricMap::getAsSimplePointsMap;
 
@@ -90,7 +90,7 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   bool internal_insertObservation(
       const mrpt::obs::CObservation& observation,
       const std::optional<const mrpt::poses::CPose3D>& robot_pose) override;
-  /// This map gives no likelihood of a pose.
+  /// Returns false: this map gives no likelihood of a pose.
   bool internal_canComputeObservationLikelihood(
       const mrpt::obs::CObservation& observation) const override;
   double internal_computeObservationLikelihood(

@@ -24,7 +24,7 @@ IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 namespace efm {
 namespace {
 
-/// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
+/// Moves and inserts keyframes of a map until they equal `keyframes`. @return true if it changed.
 bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
   bool changed = map.keyframes().size() < keyframes.size();
   for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
@@ -38,7 +38,7 @@ bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyf
   return changed;
 }
 
-/// A host that knows MRPT alone ends the recording by this.
+/// Returns whether this is the comment by which a host that knows only MRPT ends the recording.
 bool isFinish(const mrpt::obs::CObservation& observation) {
   const auto* comment = dynamic_cast<const mrpt::obs::CObservationComment*>(&observation);
   return comment != nullptr && comment->text == "event_fusion: finish";
@@ -51,7 +51,7 @@ CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder
   restart(builder_options);
 }
 
-// While all members are there: the mapping's thread may be in a callback that uses the builder.
+// Stops while all members exist: the mapping's thread may be in a callback that uses the builder.
 CEventFusionMapBuilder::~CEventFusionMapBuilder() {
   if (mapper_) mapper_->stop();
 }
@@ -64,7 +64,7 @@ std::shared_ptr<Mapper> CEventFusionMapBuilder::mapper() const {
 /// @param earlier keyframes of an initial map.
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
-  // Before the lock: who has it may wait for the end of this very callback.
+  // Checked before the lock: the thread that holds it may wait for the end of this callback.
   if (const auto current = mapper(); current && current->runsHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
@@ -76,7 +76,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      [this](const std::string& text) { MRPT_LOG_WARN(text); },
                                      [this](const std::string& text) { MRPT_LOG_INFO(text); }},
                    earlier);
-  // Without the lock: its thread may run a callback that uses the builder.
+  // Stopped without the lock: the mapper's thread may run a callback that uses the builder.
   if (const auto former = mapper()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
@@ -108,7 +108,7 @@ void CEventFusionMapBuilder::setMapCallback(MapCallback callback) {
   map_callback_ = std::move(callback);
 }
 
-/// Calls the host's callback of this moment: it may be replaced while the mapper runs.
+/// Returns a function that calls the host's current callback, which may change during mapping.
 template <typename Argument>
 std::function<void(const Argument&)> CEventFusionMapBuilder::hosts(
     std::function<void(const Argument&)> CEventFusionMapBuilder::*callback) {
@@ -133,7 +133,7 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     EventPacket packet{events->camera_index, calibrationOf(*events), events->events,
                        events->covered_until_ns};
-    if (options.enableMapUpdating) {  // MRPT's, of every map builder
+    if (options.enableMapUpdating) {  // MRPT's option of every map builder
       mapper()->add(std::move(packet));
     } else {
       mapper()->skip(packet);
@@ -214,7 +214,7 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
     const std::lock_guard<std::mutex> lock(mutex_);
     pose = reckoning_.poseAfter(action, observations);
   }
-  // One bad observation takes no other one with it.
+  // After a bad observation the other observations are still processed.
   std::exception_ptr error;
   const auto process = [&](const mrpt::obs::CObservation::Ptr& observation) {
     try {
@@ -228,7 +228,7 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
   if (error) std::rethrow_exception(error);
 }
 
-/// Forgets what was made of another mapper. Under made_mutex_.
+/// Returns the mapper. Forgets results of an earlier mapper. The caller holds made_mutex_.
 std::shared_ptr<Mapper> CEventFusionMapBuilder::mapperOfMade() const {
   const auto mapper = this->mapper();
   if (made_of_.lock() == mapper) return mapper;
@@ -244,7 +244,7 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
   out_map.clear();
   const std::lock_guard<std::mutex> lock(made_mutex_);
   const auto map = mapperOfMade()->keyframes();
-  decltype(clouds_) clouds;  // without those of keyframes that are forgotten
+  decltype(clouds_) clouds;  // without the clouds of keyframes that are forgotten
   for (const StoredKeyframe& keyframe : map->keyframes) {
     auto& cloud = clouds[keyframe.points];
     const auto known = clouds_.find(keyframe.points);
@@ -282,7 +282,7 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
   return map;
 }
 
-/// Once.
+/// Warns once.
 void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
   if (warned_of_rounding_) return;
   const auto warning = roundingWarning(points, usedOptions().cloud.voxel_size_m);

@@ -28,48 +28,47 @@ namespace efm {
 /// CObservationRobotPose). The poses are in the world's frame: the builder does no localisation.
 /// The same observations make the same map, bit for bit.
 ///
-/// The builder maps nothing until the rig is complete. The rig is complete when a packet begins
-/// more than a second after the first event, or with the first event if the options or the
-/// recording tell its cameras (see CObservationEvents). A camera that first appears later is an
-/// error.
+/// The builder maps nothing until the rig is complete. If the options or the recording declare the
+/// cameras (see CObservationEvents), the rig is complete with the first event. Otherwise it is
+/// complete when a packet begins more than a second after the first event. A camera that first
+/// appears later is an error.
 ///
 /// Automatic options (the default of depth limits, planes and windows) are chosen as the program
-/// chooses them: from the whole recording, so nothing is mapped before `finish`, and the map is the
-/// program's, bit for bit. Where the events exceed `[live] max_queue_mb`, or map updating is
-/// disabled meanwhile, they are chosen from what is there; then the depth limits follow the
-/// keyframes. In live operation they are chosen from the first second that shows a scene. The log
-/// and `status().chosen` say what was chosen from what.
+/// chooses them: from the whole recording. So nothing is mapped before `finish`, and the map equals
+/// the program's map, bit for bit. If the events exceed `[live] max_queue_mb`, or map updating is
+/// disabled meanwhile, the options are chosen from the events so far; then the depth limits follow
+/// the keyframes. In live operation the options are chosen from the first second that shows a
+/// scene. The log and `status().chosen` give each chosen value and its reason.
 ///
-/// If mapping fails (no memory, a sink that throws), the caller who feeds the builder gets the
-/// error, and so does each later one until mapping succeeds. A caller who asks for the map gets the
-/// map so far.
+/// If mapping fails (no memory, a sink that throws), each call that feeds the builder throws the
+/// error until mapping succeeds. A call that asks for the map returns the map so far.
 ///
-/// A program that knows MRPT alone makes the builder by its name, sets its options as those of a
-/// CLoadableOptions and uses it as a CMetricMapBuilder. Asking for the map changes nothing: it has
-/// the keyframes so far. `finish` maps the windows that wait for the rig or for more events: all of
-/// a recording under a second whose rig is not declared, and those that end in the last 10 ms.
+/// A program that knows only MRPT makes the builder by its name, sets the options through
+/// CLoadableOptions and uses a CMetricMapBuilder. Asking for the map changes nothing: the map has
+/// the keyframes so far. `finish` maps the waiting windows: all windows of a recording under a
+/// second whose rig is not declared, and windows that end in the last 10 ms.
 ///
-/// In live operation (`[live] enabled`) all of this happens in a thread of the builder's own, and
-/// no call but `finish` waits for it: see Mapper and plugin/README.md.
+/// In live operation (`[live] enabled`) the mapping runs in a thread of the builder, and only
+/// `finish` waits for this thread: see Mapper and plugin/README.md.
 ///
-/// Thread-safe. In playback a call that needs the map waits while a keyframe is made, but not while
-/// one is delivered or a message is logged: callbacks of both may use the builder.
-/// `processObservation` returns after the windows that became complete are mapped. Several threads
-/// may feed the builder: overlapping calls have no order, but observations in the order of time
-/// make the same map.
+/// Thread-safe. In playback a call that needs the map waits while a keyframe is made. It does not
+/// wait while a keyframe is delivered or a message is logged, so both callbacks may use the
+/// builder. `processObservation` returns after the windows that became complete are mapped. Several
+/// threads may feed the builder. Overlapping calls have no order, but observations in the order of
+/// time make the same map.
 class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
                                public mrpt::config::CLoadableOptions,
                                public mrpt::rtti::CObject {
   DEFINE_MRPT_OBJECT(CEventFusionMapBuilder, efm)
 
  public:
-  /// Receives each keyframe once, after it is inserted into the map and before the next one is
+  /// Receives each keyframe once, after its insertion into the map and before the next keyframe is
   /// made. A later refinement may change its pose: see `trajectory`. Runs in the thread that feeds
-  /// the builder. With one such thread, keyframes come in the order of their
-  /// windows. May use the builder, whose map then ends with this keyframe, and in live
-  /// operation it may drop the last reference to it. A callback of the log may not.
+  /// the builder. One such thread gets keyframes in the order of their windows. The callback may
+  /// use the builder, whose map then ends with this keyframe. In live operation this callback may
+  /// drop the last reference to the builder; a callback of the log must not do so.
   using KeyframeCallback = std::function<void(const KeyframeDepthMap&)>;
-  /// Live operation: receives each new snapshot of the map, in the mapping's thread.
+  /// Receives each new snapshot of the map in live operation, in the mapping's thread.
   using MapCallback = std::function<void(const std::shared_ptr<const MapSnapshot>&)>;
 
   explicit CEventFusionMapBuilder(const EventFusionOptions& builder_options = defaultOptions());
@@ -83,39 +82,39 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setKeyframeCallback(KeyframeCallback callback);
   void setMapCallback(MapCallback callback);
   /// @param sink receives every fused plane of every keyframe. Not owned, may be null. The threads
-  /// of the sweep call it while the mutex is held: it must not use the builder. In live operation a
-  /// keyframe that is being made still uses the former sink: it must live until the next keyframe.
+  /// of the sweep call it while the mutex is held: the sink must not use the builder. In live
+  /// operation the keyframe in work uses the former sink, which must live until the next keyframe.
   void setDsiSink(DsiSink* sink);
 
-  /// Feeds events and poses (CObservationRobotPose, CObservationOdometry). Poses of one source are
-  /// used: see PoseSourceSelector. Other observations are counted and ignored. A
+  /// Feeds events and poses (CObservationRobotPose, CObservationOdometry). Only the poses of one
+  /// source are used: see PoseSourceSelector. Other observations are counted and ignored. A
   /// CObservationRobotPose of a sensor on the rig gives T_world_rig = T_world_sensor *
   /// inverse(T_rig_sensor); with a hand-eye transform in the options T_world_rig = T_world_sensor *
   /// T_body_rig.
   /// @throws std::invalid_argument if the observation is null or contradicts its sensor or earlier
-  /// observations; std::logic_error after `finish` in playback (live, it is counted). Complete
-  /// windows are mapped before an error is thrown; their keyframes are in the map and delivered. Of
-  /// two errors, the first is thrown.
+  /// observations; std::logic_error after `finish` in playback (in live operation the observation
+  /// is counted instead). Complete windows are mapped before an error is thrown; their keyframes
+  /// are in the map and delivered. If there are two errors, the first is thrown.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
   /// Ends the recording: maps the remaining windows.
   void finish();
 
-  /// Live operation: the newest snapshot of the map; null in playback.
+  /// Returns the newest snapshot of the map in live operation; null in playback.
   std::shared_ptr<const MapSnapshot> snapshot() const;
   SessionStatus status() const;
-  /// The number of observations that were neither events nor poses.
+  /// Returns the number of observations that were neither events nor poses.
   std::uint64_t ignoredObservations() const;
-  /// The exported points of the global cloud.
+  /// Returns the exported points of the global cloud.
   MapCloud::ConstPtr points() const;
-  /// T_world_ref of all keyframes at t_ref: in the map, and of the tracker. They differ for refined
-  /// keyframes.
+  /// Returns T_world_ref of all keyframes at t_ref, as in the map or as from the tracker. The two
+  /// trajectories differ for refined keyframes.
   std::vector<StampedPose> trajectory() const;
   std::vector<StampedPose> trackerTrajectory() const;
 
   /// Reads the sections "[<prefix>_dsi]", "[<prefix>_map]" ..., or "[dsi]", "[map]" ... for an
-  /// empty prefix, and starts over: see plugin/mrpt/host_options.h. Where there are sections
-  /// "[event_fusion_dsi]" ..., an empty prefix means them, and "[map]" is the host's own. Missing
-  /// keys keep their values.
+  /// empty prefix, and starts over: see plugin/mrpt/host_options.h. If there are sections
+  /// "[event_fusion_dsi]" ..., an empty prefix means these sections, and "[map]" belongs to the
+  /// host. Missing keys keep their values.
   /// @throws std::invalid_argument naming the file, section, key and value; std::runtime_error if
   /// the file is missing. Nothing changes then.
   void loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
@@ -125,28 +124,28 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
                         const std::string& prefix) const override;
 
   /// Starts over with the same options.
-  /// @param initial_map a map of `getCurrentlyBuiltMap`: its keyframes become the first of the new
-  /// map.
+  /// @param initial_map a map of `getCurrentlyBuiltMap`: its keyframes become the first keyframes
+  /// of the new map.
   /// @param x0 not used: poses come from observations.
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
-  /// The newest pose of the rig; before the first pose, the identity. Without refinement it is the
-  /// tracker's pose with the covariance that the tracker states. With refinement it is corrected by
-  /// the latest refinement, which gives its covariance (relative to the oldest fixed keyframes of
-  /// the last window).
+  /// Returns the newest pose of the rig, the identity before the first pose. Without refinement it
+  /// is the tracker's pose with the covariance that the tracker states. With refinement the latest
+  /// refinement corrects the pose and gives its covariance (relative to the oldest fixed keyframes
+  /// of the last window).
   mrpt::poses::CPose3DPDF::Ptr getCurrentPoseEstimation() const override;
   /// Feeds the pose after the action's movement (see DeadReckoning), then each observation of the
   /// frame.
   void processActionObservation(mrpt::obs::CActionCollection& action,
                                 mrpt::obs::CSensoryFrame& observations) override;
-  /// One entry per keyframe: the pose of its reference view and a frame with its cloud; see
-  /// `insertInto` in plugin/mrpt/CEventFusionMap.h. The builder shares the frames and their
-  /// clouds: do not change them.
+  /// Returns one entry per keyframe: the pose of its reference view and a frame with its cloud; see
+  /// `insertInto` in plugin/mrpt/CEventFusionMap.h. The builder shares the frames and their clouds:
+  /// do not change them.
   void getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const override;
-  /// The number of keyframes.
+  /// Returns the number of keyframes.
   unsigned int getCurrentlyBuiltMapSize() override;
-  /// A CEventFusionMap and, for programs that know MRPT's classes alone, its exported points as a
-  /// CPointsMapXYZI. The builder owns the map, and no lock protects it: the next call of this
+  /// Returns a CEventFusionMap and, for programs that know only MRPT's classes, its exported points
+  /// as a CPointsMapXYZI. The builder owns the map, and no lock protects it: the next call of this
   /// function, setOptions, loadFromConfigFile or initialize, in any thread, changes or deletes it.
   /// Other threads use `points` or `getCurrentlyBuiltMap`. If the map has grown, the call costs an
   /// export of the whole map.
@@ -164,7 +163,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void warnOfRounding(const MapCloud& points) const;
   std::shared_ptr<Mapper> mapperOfMade() const;
 
-  std::mutex restart_mutex_;  // one at a time starts over
+  std::mutex restart_mutex_;  // held by the thread that starts over
   mutable std::mutex mutex_;  // protects all members below
   EventFusionOptions options_;
 
@@ -173,9 +172,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   DsiSink* sink_ = nullptr;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
-  DeadReckoning reckoning_;         // of the actions
+  DeadReckoning reckoning_;         // composes the actions
   std::shared_ptr<Mapper> mapper_;  // never null; used without the lock
-  mutable std::mutex made_mutex_;   // locked before mutex_; protects what MRPT's getters have made:
+  mutable std::mutex made_mutex_;   // locked before mutex_; protects the results of MRPT's getters:
   mutable std::weak_ptr<Mapper> made_of_;
   mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
       clouds_;

@@ -25,10 +25,10 @@ namespace {
 
 using mrpt::serialization::CArchive;
 
-/// The camera of `ReadEventsOf`.
+/// The camera that `ReadEventsOf` selects.
 thread_local std::optional<int> read_camera;
 
-/// The maximum size of a packet: MRPT's archives in memory count bytes in int.
+/// The maximum size of a packet. MRPT's archives in memory count bytes with an int.
 constexpr std::size_t kMaxContentBytes = std::size_t{1} << 30;
 
 std::uint32_t checksumOf(const std::vector<std::uint8_t>& bytes) {
@@ -179,7 +179,7 @@ CameraModel drawnModel(CameraModel camera) {
   return camera;
 }
 
-/// The position of a pixel on the drawn image plane, in the camera's frame.
+/// Returns the position of a pixel on the drawn image plane, in the camera's frame.
 TPoint3D onImagePlane(const CameraModel& camera, double x, double y) {
   return {(x - camera.cx) / camera.fx * kDrawnPlaneM, (y - camera.cy) / camera.fy * kDrawnPlaneM,
           kDrawnPlaneM};

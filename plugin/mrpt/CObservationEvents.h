@@ -21,28 +21,28 @@
 
 namespace efm {
 
-/// A packet of events of one camera of the rig, with the camera's calibration and pose: a rawlog
-/// needs no calibration file. By convention `sensorLabel` is "cam0", "cam1", …
+/// A packet of events of one camera of the rig. The packet has the camera's calibration and pose,
+/// so a rawlog needs no calibration file. By convention `sensorLabel` is "cam0", "cam1", …
 ///
 /// Event times are exact, in integer nanoseconds of the recording's own clock. `timestamp` is the
 /// packet's first time, rounded to MRPT's tick. A stored packet has about 3 bytes per event and a
 /// checksum: reading a damaged packet is an error.
 ///
-/// A recording announces its rig if it begins with an empty packet of each camera, which covers the
-/// camera until exactly its first event. Then nobody waits for further cameras.
+/// A recording declares its rig if it begins with one empty packet per camera, complete until
+/// exactly the camera's first event. Then the mapping does not wait for further cameras.
 class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::Visualizable {
   DEFINE_SERIALIZABLE(CObservationEvents, efm)
 
  public:
-  int camera_index = 0;              ///< In the rig, 0 to 65,535.
+  int camera_index = 0;              ///< Index in the rig, 0 to 65,535.
   CameraModel camera;                ///< Calibration, the same in all packets of a camera.
   mrpt::poses::CPose3D camera_pose;  ///< T_rig_cam (MRPT's robot is the rig).
-  std::int64_t time_offset_ns = 0;   ///< Added to the stamps: t = t_event + offset.
-  std::vector<Event> events;         ///< In time order.
-  /// All events of the camera before this time are in this packet or in earlier ones. So an empty
-  /// packet with this time says that there was no event.
+  std::int64_t time_offset_ns = 0;   ///< Offset to add to the stamps: t = t_event + offset.
+  std::vector<Event> events;         ///< Events in time order.
+  /// The time until which the camera's events are complete: all events before this time are in this
+  /// packet or in earlier packets. An empty packet with this time says that there was no event.
   std::optional<std::int64_t> covered_until_ns;
-  /// How the events are stored. Zstandard is for rawlogs that are not compressed themselves.
+  /// Compression of the stored events. Zstandard is for rawlogs without their own compression.
   EventCompression compression = EventCompression::kNone;
 
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
@@ -53,7 +53,7 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
   /// for each event: ON red, OFF blue. The image is not undistorted.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
 
-  /// For `rawlog-edit --export-txt`, which writes a line per packet: the number of events, then
+  /// Functions for `rawlog-edit --export-txt`. Its line per packet has the number of events, then
   /// four columns per event: time in seconds of the recording's clock, x, y, polarity (0 or 1).
   bool exportTxtSupported() const override { return true; }
   std::string exportTxtHeader() const override;
@@ -68,20 +68,20 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
 
 RigCamera calibrationOf(const CObservationEvents& packet);
 
-/// While it lives, this thread reads the events of one camera's packets alone: other packets have
-/// none. To decode the events takes most of the time of reading.
+/// During the lifetime of this object, its thread reads the events of one camera only; packets of
+/// other cameras get no events. Decoding the events takes most of the reading time.
 class ReadEventsOf {
  public:
-  /// @param camera its index; below 0: no camera's.
+  /// @param camera index of the camera; below 0: no events of any camera.
   explicit ReadEventsOf(int camera);
   ~ReadEventsOf();
   ReadEventsOf(const ReadEventsOf&) = delete;
   ReadEventsOf& operator=(const ReadEventsOf&) = delete;
 };
 
-/// The maximum number of drawn events of a packet. Of more events, an even selection is drawn.
+/// The maximum number of drawn events of a packet. More events are subsampled evenly.
 inline constexpr std::size_t kMaxDrawnEvents = 50'000;
-/// The distance of the drawn image plane, for a viewer whose first view spans some twenty metres.
+/// Distance of the drawn image plane, chosen for a viewer whose first view is about 20 m wide.
 inline constexpr double kDrawnPlaneM = 3;
 
 }  // namespace efm

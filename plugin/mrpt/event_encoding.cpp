@@ -14,11 +14,11 @@ namespace {
 constexpr std::uint8_t kColumns = 1;
 constexpr std::uint8_t kZstdColumns = 2;
 constexpr std::size_t kMaxEventSize =
-    15;  // 10 bytes of the time, 4 of the pixel, 1 of the polarity
+    15;  // 10 bytes for the time, 4 for the pixel, 1 for the polarity
 constexpr std::int64_t kTicksNs[] = {1, 1000};
 constexpr std::size_t kHeaderSize = 10;  // encoding, tick, first time
 
-/// Writes an integer and moves `to` behind it.
+/// Writes an integer and moves `to` behind the written bytes.
 void putVarint(std::uint8_t*& to, std::uint64_t value) {
   while (value >= 0x80) {
     *to++ = static_cast<std::uint8_t>(value | 0x80);
@@ -54,7 +54,7 @@ class ByteReader {
   std::size_t at_ = 0;
 };
 
-/// Time differences wrap around as unsigned numbers do, so any two times have a difference.
+/// Returns the time difference, which wraps around as unsigned numbers do: it always exists.
 std::int64_t stepBetween(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(to_ns) -
                                    static_cast<std::uint64_t>(from_ns));
@@ -71,7 +71,7 @@ std::int64_t advance(std::int64_t t_ns, std::int64_t steps, std::int64_t tick_ns
                                        static_cast<std::uint64_t>(tick_ns));
 }
 
-/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small steps of both signs have few bytes.
+/// Encodes 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small steps of both signs need few bytes.
 std::uint64_t zigzag(std::int64_t value) {
   return (static_cast<std::uint64_t>(value) << 1) ^ (value < 0 ? ~std::uint64_t{0} : 0);
 }
@@ -88,7 +88,7 @@ std::vector<std::uint8_t> encodeColumns(const std::vector<Event>& events) {
   *to++ = tick;
   const auto first = static_cast<std::uint64_t>(events.front().t_ns);
   for (int shift = 0; shift < 64; shift += 8) *to++ = static_cast<std::uint8_t>(first >> shift);
-  // The divisor is a constant in each branch.
+  // Each branch has a constant divisor, which is faster.
   const auto put_steps = [&](auto tick_ns) {
     for (std::size_t i = 1; i < count; ++i) {
       putVarint(to, zigzag(stepBetween(events[i - 1].t_ns, events[i].t_ns) / tick_ns()));
@@ -126,7 +126,7 @@ std::vector<Event> decodeColumns(const std::vector<std::uint8_t>& bytes, std::si
         fmt::format("encoded events: encoding {}, this program knows 1 and 2", encoding));
   }
   const std::uint8_t tick = reader.byte();
-  // Each event takes 4 bytes of coordinates at least.
+  // Each event needs at least 4 bytes, for its coordinates.
   if (tick > 1 || count == 0 || count > bytes.size() / 4) {
     throw std::runtime_error("encoded events: a header that cannot be");
   }
@@ -153,7 +153,7 @@ std::vector<Event> decodeColumns(const std::vector<std::uint8_t>& bytes, std::si
   return events;
 }
 
-/// The bytes of encoding 1 as those of encoding 2.
+/// Converts encoding 1 to encoding 2.
 std::vector<std::uint8_t> compressed(const std::vector<std::uint8_t>& bytes) {
   constexpr int kFastest = 1;
   std::vector<std::uint8_t> result(1 + ZSTD_compressBound(bytes.size() - 1));
@@ -168,7 +168,7 @@ std::vector<std::uint8_t> compressed(const std::vector<std::uint8_t>& bytes) {
   return result;
 }
 
-/// The reverse. @param count limits the memory that damaged bytes can ask for.
+/// Converts encoding 2 to encoding 1. @param count limits the memory for damaged bytes.
 std::vector<std::uint8_t> decompressed(const std::vector<std::uint8_t>& bytes, std::size_t count) {
   const auto size = ZSTD_getFrameContentSize(bytes.data() + 1, bytes.size() - 1);
   if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ||

@@ -14,7 +14,7 @@
 namespace efm {
 namespace {
 
-/// Empty if the source is no file.
+/// Returns the source's file, an empty path if the source is not a file.
 std::filesystem::path fileOf(const mrpt::config::CConfigFileBase& source) {
   const auto* file = dynamic_cast<const mrpt::config::CConfigFile*>(&source);
   return file ? file->getAssociatedFile() : std::string();
@@ -57,7 +57,7 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
 
 void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::string& prefix,
                      OptionReader& reader) {
-  // MRPT treats a missing file as an empty one.
+  // MRPT treats a missing file as an empty file.
   if (const auto file = fileOf(source); !file.empty() && !std::filesystem::exists(file)) {
     throw std::runtime_error("cannot read the option file " + file.string());
   }
@@ -73,7 +73,7 @@ void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::str
     }
     return;
   }
-  // A host may have a [map] or [output] of its own: where ours have a prefix, only they count.
+  // A host may have its own [map] or [output]. If there are prefixed sections, only these are ours.
   const std::string prefixed = "event_fusion";
   if (!sectionsBelow(source, prefixed).empty()) {
     readHostOptions(source, prefixed, reader);

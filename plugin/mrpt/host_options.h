@@ -9,21 +9,21 @@
 
 namespace efm {
 
-/// Reads our options from the configuration of an MRPT program, which has other sections, too.
+/// Reads our options from the configuration of an MRPT program, which also has other sections.
 ///
-/// With the prefix "mapper" our sections are [mapper_dsi], [mapper_map] and so on; any other
-/// section that begins with "mapper_" is an error. With an empty prefix they are [dsi], [map], ...,
-/// and all other sections belong to the host. A host with a [map] of its own calls ours
-/// [event_fusion_dsi], [event_fusion_map], ...: where there is such a section, an empty prefix
-/// means "event_fusion". Our sections are checked as in our own files, but MRPT hides a key that is
-/// given twice.
+/// If the prefix is "mapper", our sections are [mapper_dsi], [mapper_map] and so on; any other
+/// section that begins with "mapper_" is an error. If the prefix is empty, our sections are [dsi],
+/// [map], ..., and all other sections belong to the host. A host that has its own [map] names our
+/// sections [event_fusion_dsi], [event_fusion_map], ...: if there is such a section, an empty
+/// prefix means "event_fusion". Our sections are checked as in our own files, with one exception:
+/// MRPT hides a key that is given twice.
 /// @throws std::invalid_argument naming the file (if there is one), the section, the key and the
-/// value, or the prefix if no section has it; std::runtime_error if the source's file is missing,
-/// which MRPT treats as an empty file.
+/// value, or the prefix if no section has it; std::runtime_error if the source's file is missing
+/// (MRPT treats a missing file as an empty file).
 void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::string& prefix,
                      OptionReader& reader);
 
-/// Writes all options to the sections of `readHostOptions` with the same prefix.
+/// Writes all options to the sections that `readHostOptions` reads with the same prefix.
 void writeHostOptions(const EventFusionOptions& options, const std::string& prefix,
                       mrpt::config::CConfigFileBase& target);
 
@@ -31,12 +31,12 @@ void writeHostOptions(const EventFusionOptions& options, const std::string& pref
 void readHostSection(const mrpt::config::CConfigFileBase& source, const std::string& host_section,
                      std::string_view section, OptionReader& reader);
 
-/// The host's sections that begin with "<prefix>_".
+/// Returns the host's sections that begin with "<prefix>_".
 std::vector<std::string> sectionsBelow(const mrpt::config::CConfigFileBase& source,
                                        const std::string& prefix);
 
-/// The beginning of errors: "host.ini, section mapper_dsi:", or "options, section ..." without a
-/// file. Without brackets: MRPT interprets brackets and reorders the message.
+/// Returns the beginning of errors: "host.ini, section mapper_dsi:", or "options, section ..."
+/// without a file. It has no brackets, because MRPT interprets brackets and reorders the message.
 std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::string& section);
 
 }  // namespace efm

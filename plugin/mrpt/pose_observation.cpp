@@ -17,8 +17,8 @@
 namespace efm {
 
 Rigid3 rigidFrom(const mrpt::poses::CPose3D& pose) {
-  // From the matrix: getAsQuaternion uses the angles and loses up to half of the digits near a
-  // pitch of 90 degrees.
+  // The matrix is used because getAsQuaternion uses the angles and loses up to half of the digits
+  // near a pitch of 90 degrees.
   const Eigen::Matrix3d rotation = pose.getRotationMatrix().asEigen();
   return {Eigen::Quaterniond(rotation).normalized(), {pose.x(), pose.y(), pose.z()}};
 }
@@ -42,7 +42,7 @@ mrpt::poses::CPose3D mrptPoseFrom(const Rigid3& T_a_b) {
 mrpt::poses::CPose3DPDFGaussian mrptPoseFrom(const Rigid3& T_a_b, const Matrix6d& covariance) {
   mrpt::poses::CPose3DQuatPDFGaussian with_quaternion;
   with_quaternion.mean = quaternionPoseFrom(T_a_b);
-  // A small rotation vector v about the axes of a makes q to (1, v / 2) q.
+  // A small rotation vector v about the axes of frame a changes q to (1, v / 2) q.
   const auto& q = with_quaternion.mean.quat();
   Eigen::Matrix<double, 7, 6> by_motion = Eigen::Matrix<double, 7, 6>::Zero();
   by_motion.topLeftCorner<3, 3>().setIdentity();
@@ -159,7 +159,7 @@ void TrackerPoses::add(const mrpt::obs::CObservation& observation, const PoseSam
                        const Rigid3& T_world_rig) {
   const auto [at, is_new] = newest_.try_emplace(pose.source);
   Newest& newest = at->second;
-  // One that is much older than the newest says that its time was wrong, or the clock went back.
+  // If a pose is over 1 s older, the newest time was wrong, or the clock was reset.
   if (!is_new && pose.t_ns < newest.t_ns && newest.t_ns - pose.t_ns <= kNanosecondsPerSecond) {
     return;
   }

@@ -51,12 +51,12 @@ void dropThrough(std::string_view& text, std::string_view last) {
   if (at != std::string_view::npos) text.remove_prefix(at + last.size());
 }
 
-/// The reason of an error without MRPT's decoration. Each object around the damaged one adds
+/// Returns the reason of an error without MRPT's decoration. Each object around the damage adds
 ///
 ///     ==== MRPT exception ====
 ///     Message:  Exception while parsing typed object '…' from …
 ///     Original exception:
-///     <the same of the inner object, or the reason>
+///     <this text for the inner object, or the reason>
 ///     Location: <source file, line, function>
 ///     Call stack backtrace: …
 std::string reasonOf(const std::exception& error) {
@@ -85,7 +85,7 @@ std::string reasonOf(const std::exception& error) {
 using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
 
-/// The observations of a rawlog, one by one, also those in sensory frames.
+/// Reads the observations of a rawlog one by one, including observations in sensory frames.
 class RawlogReader {
  public:
   /// @param camera see `ReadEventsOf`.
@@ -114,7 +114,7 @@ class RawlogReader {
     return observation;
   }
 
-  /// The entry of the last observation.
+  /// Returns the entry of the last observation.
   std::string position() const {
     return fmt::format("entry {} of {}", entries_ == 0 ? 0 : entries_ - 1, file_.string());
   }
@@ -142,8 +142,8 @@ class RawlogReader {
     }
   }
 
-  /// Composes the actions so far to poses, with the frame's time if they have none. Of several
-  /// poses of one time, only the last has all movements before the frame.
+  /// Composes the actions so far to poses. An action without a time gets the frame's time. If poses
+  /// have the same time, only the last pose is kept: it has all movements before the frame.
   void takeActions(const mrpt::obs::CSensoryFrame& frame) {
     CObservation::Ptr newest;
     while (!actions_.empty()) {
@@ -157,7 +157,7 @@ class RawlogReader {
     }
   }
 
-  /// MRPT treats every exception of a stream before an object's name as the end of the file.
+  /// Returns the reason. MRPT reports each error of a stream before an object's name as its end.
   std::string whyStopped(const std::exception& error) {
     std::string reason = reasonOf(error);
     if (reason.find("Assert condition failed") != std::string::npos) {
@@ -175,7 +175,7 @@ class RawlogReader {
   std::filesystem::path file_;
   int camera_;
   GzStream stream_;
-  std::uint64_t entries_ = 0;  // read so far
+  std::uint64_t entries_ = 0;  // entries that were read so far
   std::deque<CObservation::Ptr> pending_;
   std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // before the next frame
   DeadReckoning reckoning_;
@@ -185,7 +185,7 @@ CObservationEvents::Ptr asPacket(const CObservation::Ptr& observation) {
   return std::dynamic_pointer_cast<CObservationEvents>(observation);
 }
 
-/// The events of one camera.
+/// Reads the events of one camera.
 class RawlogEvents : public EventStream {
  public:
   /// @param first the camera's first packet, without events.
@@ -229,7 +229,7 @@ class RawlogEvents : public EventStream {
   std::string damage_;
 };
 
-/// The observations that are neither events nor poses. Its damage is that of the events.
+/// Reads observations that are neither events nor poses. The streams of events report damage.
 class RawlogOthers : public OtherStream {
  public:
   explicit RawlogOthers(const std::filesystem::path& file) : reader_(file) {}
@@ -250,7 +250,7 @@ class RawlogOthers : public OtherStream {
   RawlogReader reader_;
 };
 
-/// A pose that cannot be used is an error at the recording's end.
+/// Adds a pose. A pose that cannot be used causes an error at the recording's end.
 void addPose(const CObservation::Ptr& observation, const std::string& position,
              const ReaderOptions& options, RecordingParts& parts) {
   try {
@@ -269,7 +269,7 @@ CObservation::Ptr packetOf(EventPacket packet) {
   observation->timestamp = packet.t_ns ? mrptTimeFrom(*packet.t_ns) : INVALID_TIMESTAMP;
   observation->camera_index = packet.camera;
   observation->camera = camera.model;
-  // A second conversion would change the last digits.
+  // The original pose is kept, because a second conversion would change the last digits.
   const bool is_original = original && isSame(rigidFrom(original->camera_pose), camera.T_rig_cam);
   observation->camera_pose = is_original ? original->camera_pose : mrptPoseFrom(camera.T_rig_cam);
   observation->time_offset_ns = camera.time_offset_ns;
@@ -356,7 +356,7 @@ bool GzStream::atEnd() {
     return false;
   }
   int code = Z_OK;
-  gzerror(file_.get(), &code);  // also of a truncated file
+  gzerror(file_.get(), &code);  // it also reports a truncated file
   if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
   return true;
 }
@@ -416,7 +416,7 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
     if (cameras.empty()) parts.poses_damage = error.what();
   }
   Calibration calibration{file, {}};
-  bool is_calibrated = false;  // at least one camera: of another one, the mapping says it
+  bool is_calibrated = false;  // at least one camera; the mapping reports uncalibrated cameras
   for (const auto& [index, first] : cameras) {
     if (index != static_cast<int>(calibration.rig.cameras.size())) {
       throw std::runtime_error(

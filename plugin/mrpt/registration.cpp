@@ -33,6 +33,6 @@ const struct AtLoad {
 }  // namespace
 }  // namespace efm
 
-/// What the program loads of this library.
+/// The functions that the program loads from this library.
 extern "C" const efm::MrptLibrary efmMrptLibrary = {efm::openRawlog, efm::writeRawlog,
                                                     efm::writeSimpleMap, efm::recordFrames};

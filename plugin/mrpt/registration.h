@@ -4,8 +4,8 @@
 namespace efm {
 
 /// Registers the project's MRPT classes, so that MRPT reads them from rawlogs and makes them by
-/// name. Loading the library does this, too. A program that links the library calls it once, so
-/// that the linker keeps the library. Further calls have no effect.
+/// name. Loading the library also registers them. A program that links the library calls this
+/// function once, so that the linker keeps the library. Further calls have no effect.
 void registerClasses();
 
 }  // namespace efm

@@ -27,18 +27,18 @@ using mrpt::opengl::CPointCloudColoured;
 using mrpt::opengl::CSetOfLines;
 
 const mrpt::img::TColorf kBackground(0.07F, 0.08F, 0.10F, 1);
-constexpr double kPicturesLeft = 0.76;  // of the window's width
+constexpr double kPicturesLeft = 0.76;  // fraction of the window's width
 constexpr double kFieldOfViewDeg = 40;
 constexpr double kElevationDeg = 15;
 constexpr double kSwayDeg = 25;
-constexpr double kSwayKeyframes = 48;  // a period
-constexpr double kFollow = 0.15;       // of the way to the wanted view, each time
+constexpr double kSwayKeyframes = 48;  // keyframes in a period of the sway
+constexpr double kFollow = 0.15;       // part of the way to the wanted view, per keyframe
 
 Eigen::Vector3d axisOf(const StampedPose& pose, int axis) {
   return pose.T_world_rig.rotation * Eigen::Vector3d::Unit(axis);
 }
 
-/// The value with a fraction of all values below it.
+/// Returns the value that has this fraction of all values below it.
 double quantile(std::vector<double>& values, double fraction) {
   const auto at = values.begin() +
                   static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
@@ -46,7 +46,7 @@ double quantile(std::vector<double>& values, double fraction) {
   return *at;
 }
 
-/// 256 colours from blue to red, all of them bright.
+/// Returns 256 bright colours from blue to red.
 cv::Mat3b heightColours() {
   cv::Mat1b levels(1, 256);
   for (int i = 0; i < 256; ++i) levels(i) = static_cast<uchar>(25 + i * 205 / 255);
@@ -79,8 +79,8 @@ namespace fs = std::filesystem;
 constexpr unsigned kWidth = 1280;
 constexpr unsigned kHeight = 720;
 
-/// Whether a file is named frame_000001.png, or has the temporary name of such a file, which a
-/// killed run leaves.
+/// Returns whether a file is named frame_000001.png, or has the temporary name of such a file (a
+/// killed run leaves such files).
 bool isFrame(const fs::path& file) {
   const std::string name = file.filename().string();
   return name.size() >= 16 && name.compare(0, 6, "frame_") == 0 && file.extension() == ".png" &&
@@ -160,7 +160,7 @@ MapScene::MapScene() : scene_(mrpt::opengl::COpenGLScene::Create()) {
   };
   add_lines("trajectory", {255, 255, 255, 255}, 2);
   add_lines("frustum", {255, 200, 60, 255}, 2);
-  auto column = scene_->createViewport("column");  // behind the pictures, where a window is grey
+  auto column = scene_->createViewport("column");  // behind the pictures: a window is grey there
   column->setViewportPosition(kPicturesLeft - 0.01, 0, 1.01 - kPicturesLeft, 1);
   column->setCustomBackgroundColor(kBackground);
   addPicture(*scene_, "depth", 0.52);
@@ -274,7 +274,7 @@ void MapScene::turnView(const WatchedMap& snapshot) {
                        static_cast<float>(centre_.z()));
   camera.setAzimuthDegrees(static_cast<float>(behind_deg + sway_deg));
   camera.setElevationDegrees(kElevationDeg);
-  // At 1 a ball of the map's radius fills the view; a map fills less than the ball.
+  // 1: a ball with the map's radius fills the view. A map fills less than this ball.
   constexpr double kNearer = 0.75;
   const double distance_m =
       kNearer * std::max(radius_m_, 1e-3) / std::sin(kFieldOfViewDeg / 2 * M_PI / 180);

@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPeriod{100};
-constexpr int kMaxCost = 20;  // an export takes at most this part of the time
+constexpr int kMaxCost = 20;  // an export takes at most 1/20 of the time
 
 class MrptWindow : public MapWindow {
  public:
@@ -35,7 +35,7 @@ class MrptWindow : public MapWindow {
     }
     changed_.notify_all();
     thread_.join();
-    // MRPT destroys the window's scene in a thread that may outlive main(), when the table of its
+    // MRPT destroys the window's scene in a thread that may outlive main(), when the table of
     // textures is gone. So the window gets an empty scene, and `scene_` releases the textures.
     window_.get3DSceneAndLock() = mrpt::opengl::COpenGLScene::Create();
     window_.unlockAccess3DScene();
@@ -61,7 +61,7 @@ class MrptWindow : public MapWindow {
     const auto now = Clock::now();
     next_ = now + std::max<Clock::duration>(kPeriod, kMaxCost * (now - asked_));
     const std::lock_guard<std::mutex> lock(mutex_);
-    waiting_ = std::move(snapshot);  // in place of one that was not drawn yet
+    waiting_ = std::move(snapshot);  // replaces a snapshot that was not drawn yet
     changed_.notify_all();
   }
 
@@ -118,12 +118,12 @@ class MrptWindow : public MapWindow {
   MapScene scene_;
   std::optional<std::array<float, 3>> placed_;  // the view that was set last
   Clock::time_point asked_, next_;
-  bool told_ = false;  // that the window was closed
-  std::mutex mutex_;   // of the members below
+  bool told_ = false;  // the user knows that the window was closed
+  std::mutex mutex_;   // protects the members below
   std::condition_variable changed_;
   std::optional<WatchedMap> waiting_;
   bool stop_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, because it uses the other members
 };
 
 }  // namespace
