@@ -19,8 +19,8 @@
 namespace efm {
 namespace {
 
-/// Magic, version 1.0, length, and a dictionary padded so that the data begins at a multiple of 64
-/// bytes (NEP 1).
+/// Returns magic bytes, version 1.0, length, and a dictionary that is padded so that the data
+/// begins at a multiple of 64 bytes (NEP 1).
 std::string npyHeader(int planes, const ReferenceView& view) {
   std::string dictionary =
       fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}, {}), }}", planes,
@@ -63,8 +63,8 @@ std::unique_ptr<AtomicFile> NpyDsiFile::finish() {
 
 namespace {
 
-/// A lock of the whole file. It is of this opening of the file, so it also excludes another run in
-/// the same process.
+/// Returns a lock of the whole file. The lock belongs to the open file, not to the process, so it
+/// also excludes another run in the same process.
 flock wholeFile() {
   flock lock{};
   lock.l_type = F_WRLCK;
@@ -88,7 +88,7 @@ RunMark::RunMark(const std::filesystem::path& folder, const std::vector<std::str
     return std::runtime_error("cannot write '" + path.string() + "': " + text);
   };
   struct stat status {};
-  do {  // until the file is still there when it is locked: its run may have ended meanwhile
+  do {  // repeat until the locked file still exists: a run that ended meanwhile removed it
     if (file_ >= 0) ::close(file_);
     file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (file_ < 0) throw fail();
@@ -96,7 +96,7 @@ RunMark::RunMark(const std::filesystem::path& folder, const std::vector<std::str
     if (::fcntl(file_, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
       ::close(file_);
       throw atWork(folder);
-    }  // a file system without locks cannot tell
+    }  // on a file system without locks, another run is not detected
   } while (::fstat(file_, &status) == 0 && status.st_nlink == 0);
   const std::string text = nlohmann::json{{"recording", recording}, {"process", getpid()}}.dump(
                                2, ' ', false, nlohmann::json::error_handler_t::replace) +

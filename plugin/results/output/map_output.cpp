@@ -26,7 +26,7 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-// Removed first: without it, the rest of an earlier result does not look complete.
+// Removed first: without the report, the remaining files do not look like a complete result.
 constexpr const char* kReport = "report.json";
 constexpr const char* kKeyframes = "keyframes";
 constexpr std::array<std::string_view, 8> kMapFiles = {
@@ -44,7 +44,7 @@ void makeFolder(const std::filesystem::path& folder) {
   }
 }
 
-/// A file that is not regular was not written here. @return whether there was one to remove.
+/// Removes a regular file: other files were not written here. @return true if a file was removed.
 bool removeFile(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(std::filesystem::symlink_status(file)) &&
          std::filesystem::remove(file);
@@ -77,7 +77,7 @@ void removeTemporaryFiles(const std::filesystem::path& folder, pid_t process) {
   }
 }
 
-constexpr std::string_view kCameraFolder = "cam";  // and the camera's index
+constexpr std::string_view kCameraFolder = "cam";  // followed by the camera's index
 
 std::string cameraFolder(int camera) { return std::string(kCameraFolder) + std::to_string(camera); }
 
@@ -88,7 +88,7 @@ bool isCameraFolder(const std::filesystem::directory_entry& entry) {
          std::filesystem::is_directory(entry.symlink_status());
 }
 
-/// Removes the images of a keyframe and of its single cameras.
+/// Removes the images of a keyframe and the images of its cameras.
 void removeImages(const std::filesystem::path& folder) {
   removeFiles(folder, kImages);
   std::vector<std::filesystem::path> cameras;
@@ -131,7 +131,7 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
   }
 }
 
-/// The report of a run, if the file is one.
+/// Returns the content of a report, std::nullopt if the file is not the report of a run.
 std::optional<EarlierResult> readReport(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file)) return std::nullopt;
   std::ifstream stream(file);
@@ -148,7 +148,7 @@ std::optional<EarlierResult> readReport(const std::filesystem::path& file) {
   }
 }
 
-/// Writes a file by a function that puts the content into a stream.
+/// Returns a function that writes a file; `write` puts the content into a stream.
 std::function<void(const std::filesystem::path&)> byStream(
     std::function<void(std::ostream&)> write) {
   return [write = std::move(write)](const std::filesystem::path& path) {
@@ -177,12 +177,12 @@ MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
       style_(style),
       recording_(std::move(recording)) {
   makeFolder(folder_);
-  // Before the first file of this run: one may be under way when `begin` runs (dsi.npy).
+  // Done before the first file of this run: dsi.npy may be in progress when `begin` runs.
   const auto killed = RunMark::ofKilledRun(folder_);
   if (!killed) return;
   removeTemporaryFiles(folder_, killed->process);
   for (const auto& empty : keyframeFolders(folder_ / kKeyframes)) ::rmdir(empty.c_str());
-  // The mark stays where nothing else tells that the folder is a result's.
+  // Without a report the mark stays: only the mark shows that the folder holds a result.
   if (readReport(folder_ / kReport)) removeFile(folder_ / RunMark::kName);
 }
 
@@ -205,14 +205,14 @@ bool MapOutput::holdsFilesOf(OutputKind kind, const std::filesystem::path& folde
 MapOutput::~MapOutput() {
   if (!keeps_earlier_) return;
   waiting_.clear();
-  // Leaves files, and folders that hold some.
+  // rmdir removes only empty folders: files, and folders that hold files, stay.
   for (auto path = not_on_disk_.rbegin(); path != not_on_disk_.rend(); ++path) {
     ::rmdir(path->c_str());
   }
   ::unlink((folder_ / RunMark::kName).c_str());
 }
 
-/// Before the first file.
+/// Prepares the folder before the first file.
 void MapOutput::begin() {
   if (mark_) return;
   const std::optional<EarlierResult> earlier = earlierResult(folder_);
@@ -221,7 +221,7 @@ void MapOutput::begin() {
   if (!keeps_earlier_) removeEarlier(earlier.has_value());
 }
 
-/// A map of five keyframes must not show two of an earlier map of seven.
+/// Removes an earlier result: a new map of five keyframes must not show two old keyframes.
 void MapOutput::removeEarlier(bool of_both_kinds) {
   removeFiles(folder_, std::array{kReport});
   if (of_both_kinds || kind_ == OutputKind::kMap) {
@@ -259,7 +259,7 @@ void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
   try {
     writeImagesTo(folder, keyframe);
   } catch (...) {
-    if (!keeps_earlier_) removeKeyframe(folder);  // half of one is none
+    if (!keeps_earlier_) removeKeyframe(folder);  // no incomplete keyframe stays
     throw;
   }
 }
@@ -284,7 +284,7 @@ void MapOutput::writeImagesTo(const std::filesystem::path& folder,
   }
 }
 
-/// Pictures wait for the disk together, before the report: four files per keyframe would each wait.
+/// Writes a picture. All pictures are synced to disk together, before the report: this is faster.
 void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& image) {
   const std::size_t folder = folder_.native().size();
   for (std::filesystem::path part = path; part.native().size() > folder;) {

@@ -20,92 +20,91 @@
 
 namespace efm {
 
-/// The files of a folder, which holds one kind.
+/// The kind of files in a folder. A folder holds one kind.
 enum class OutputKind {
   /// map.pcd, map.ply, map.simplemap, map.html, map.png, overview.png, trajectory.txt, report.json,
   /// keyframes/<t_ref>/ with images
   kMap,
-  kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
+  kDepth,  ///< The images of one keyframe, points.pcd, dsi.npy, report.json.
 };
 
-/// How depth.png and confidence.png are drawn.
+/// The style of depth.png and confidence.png.
 enum class PictureStyle {
-  kFigure,  ///< For a paper: with a colour bar, small ones enlarged.
-  kPlain,   ///< The image alone, of the depth map's size.
+  kFigure,  ///< A figure for a paper: with a colour bar; small images are enlarged.
+  kPlain,   ///< The image only, in the depth map's size.
 };
 
 /// The result of an earlier run in a folder.
 struct EarlierResult {
-  bool complete = false;               ///< Otherwise its run was killed.
-  std::vector<std::string> recording;  ///< Its files. Empty: the result does not name them.
+  bool complete = false;               ///< False: the run was killed.
+  std::vector<std::string> recording;  ///< The files of the recording. Empty: unknown.
   std::uint64_t keyframes = 0;
 
-  /// Whether it is of these files. Bytes that are not UTF-8 may differ.
+  /// Returns whether the result is of these files. Bytes that are not UTF-8 are not compared.
   bool isOf(const std::vector<std::string>& files) const;
 };
 
-/// The folder that a map is written to. A file appears under its name when it is complete. The
-/// caller writes report.json last: a folder with a report.json is complete, and all its files are
-/// of one run. A std::runtime_error names a file that cannot be written.
+/// The folder that a map is written to. A file gets its name when it is complete. The caller writes
+/// report.json last: a folder with a report.json is complete, and all its files are from one run.
+/// If a file cannot be written, a std::runtime_error names the file.
 ///
-/// An earlier result with a report stays until the new report is written: until then the new files
-/// have temporary names, and without a report they are removed. What else an earlier run left is
-/// removed right before the first file.
+/// An earlier result with a report stays until the new report is written. Until then the new files
+/// have temporary names; they are removed if no report is written. The files of an earlier run
+/// without a report are removed before the first file is written.
 ///
-/// Until then the folder has a RunMark, by which the next run knows that it may replace what a
-/// killed run left.
+/// From the first file to the report the folder has a RunMark. If the run is killed, the mark tells
+/// the next run that it may replace the files.
 ///
 ///     map.pcd  map.simplemap  map.html  map.png  overview.png  trajectory.txt  report.json
 ///     map.ply                  by option
-///     trajectory_tracker.txt   where poses were refined
+///     trajectory_tracker.txt   if poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
-///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
+///     keyframes/<t_ref>/camN/{the four images of one camera, events.png}   by option
 class MapOutput {
  public:
-  /// Creates the folder. Files of the other kind are removed only where they are an
-  /// `earlierResult`.
-  /// @param limits the colours of depth.png run between its depths.
-  /// @param recording its files, for the next run.
-  /// @throws std::runtime_error where the folder cannot be made, or another run writes its result
-  /// there; so do the functions that write.
+  /// Creates the folder. Files of the other kind are removed only if they are an `earlierResult`.
+  /// @param limits depth limits of the colours in depth.png.
+  /// @param recording the files of the recording; the next run reads them.
+  /// @throws std::runtime_error if the folder cannot be made, or another run writes its result
+  /// there. The functions that write throw the same errors.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits,
             PictureStyle style = PictureStyle::kFigure, std::vector<std::string> recording = {});
 
-  /// Removes the files that wait for the report.
+  /// Removes the files that still wait for the report.
   ~MapOutput();
 
-  /// The result of either kind in a folder: a report, or the mark of a run that was killed.
-  /// @throws std::runtime_error where another run is writing its result there.
+  /// Returns the result of either kind in a folder, from a report or the mark of a killed run.
+  /// @throws std::runtime_error if another run is writing its result there.
   static std::optional<EarlierResult> earlierResult(const std::filesystem::path& folder);
-  /// Whether a folder has a file or a folder with a name that only this kind writes.
+  /// Returns whether a folder has a file or a folder with a name that only this kind writes.
   static bool holdsFilesOf(OutputKind kind, const std::filesystem::path& folder);
 
   /// Writes the keyframe's four images below keyframes/.
   void writeKeyframe(const KeyframeDepthMap& keyframe);
-  /// Writes the four images straight into the folder: for a folder of one keyframe.
+  /// Writes the four images directly into the folder, for a folder of one keyframe.
   void writeImages(const KeyframeDepthMap& keyframe);
-  /// T_world_ref at t_ref of the keyframes, TUM format.
+  /// Writes T_world_ref of the keyframes at t_ref, TUM format.
   /// @param name "trajectory.txt" or "trajectory_tracker.txt".
   void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
-  /// @param name "map.pcd" or "points.pcd".
+  /// Writes points. @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const MapCloud& cloud);
-  /// map.ply, coloured by height.
+  /// Writes map.ply, coloured by height.
   /// @param upward a unit vector, frame `world`.
   void writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward);
-  /// @param name "map.simplemap".
-  /// @param write writes a file at the given path; the file is renamed afterwards.
+  /// Writes a file by a function. @param name "map.simplemap".
+  /// @param write writes the file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,
                  const std::function<void(const std::filesystem::path&)>& write);
-  /// @param name "map.png" or "overview.png".
+  /// Writes a picture. @param name "map.png" or "overview.png".
   void writePicture(const std::string& name, const cv::Mat3b& picture);
-  /// map.html.
+  /// Writes map.html.
   void writePage(const std::function<void(std::ostream&)>& write);
   /// Gives a complete file of the folder its name.
   void add(std::unique_ptr<AtomicFile> file);
-  /// All other files are complete: replaces an earlier result.
+  /// Writes the report after all other files are complete, and replaces an earlier result.
   void writeReport(const std::string& json);
 
-  /// Whether an earlier result stays until the report is written.
+  /// Returns whether an earlier result stays until the report is written.
   bool keepsEarlier() const { return keeps_earlier_; }
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -127,8 +126,8 @@ class MapOutput {
   std::vector<std::string> recording_;
   std::unique_ptr<RunMark> mark_;  // from the first file on
   bool keeps_earlier_ = false;
-  std::vector<std::unique_ptr<AtomicFile>> waiting_;  // for the report
-  std::set<std::filesystem::path> not_on_disk_;       // pictures and their folders
+  std::vector<std::unique_ptr<AtomicFile>> waiting_;  // files that wait for the report
+  std::set<std::filesystem::path> not_on_disk_;       // pictures and their folders, not synced yet
 };
 
 }  // namespace efm

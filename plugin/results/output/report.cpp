@@ -67,7 +67,7 @@ Json asJson(const StageSeconds& seconds) {
           {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
 }
 
-/// Processor time: what a run costs once, and what grows with its events and its keyframes.
+/// Returns processor time: the fixed cost of a run, and costs that grow with events and keyframes.
 Json byGrowth(const StageSeconds& cpu) {
   const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.sweep +
                           cpu.depth + cpu.refine + cpu.map + cpu.images;
@@ -254,31 +254,31 @@ std::string reportJson(const MapReport& report) {
 
 namespace {
 
-/// "points       48210".
+/// Adds a line such as "points       48210".
 void addLine(std::string& text, const char* name, const std::string& fact) {
   text += fmt::format("{:<11} {}\n", name, fact);
 }
 
-/// "48210", or "12.3 million".
+/// Returns text such as "48210" or "12.3 million".
 std::string countText(std::uint64_t count) {
   constexpr std::uint64_t kMillion = 1'000'000;
   if (count < kMillion) return std::to_string(count);
   return fmt::format("{:.1f} million", static_cast<double>(count) / kMillion);
 }
 
-/// "5.1 %". A small share is not shown as none.
+/// Returns text such as "5.1 %". A small share is not shown as 0 %.
 std::string shareText(std::uint64_t part, std::uint64_t whole) {
   const double percent = 100.0 * static_cast<double>(part) / static_cast<double>(whole);
   return percent < 0.05 ? "under 0.1 %" : fmt::format("{:.1f} %", percent);
 }
 
-/// Short times have a decimal.
+/// Returns a duration; short durations have a decimal.
 std::string shortDurationText(double seconds) {
   constexpr double kShortS = 9.95;
   return seconds < kShortS ? fmt::format("{:.1f} s", seconds) : durationText(seconds);
 }
 
-/// Of 0.1 to 99.9 % of the points: the extent that a reader expects of a room.
+/// Returns text for `most_extent`: the extent that a reader expects of a room.
 std::string extentText(const MapExtent& extent) {
   const Eigen::Vector3d size_m = extent.max_m - extent.min_m;
   std::string text = fmt::format("{:.2f} x {:.2f} x {:.2f} m:", size_m.x(), size_m.y(), size_m.z());
@@ -291,7 +291,7 @@ std::string extentText(const MapExtent& extent) {
   return text;
 }
 
-/// The share of used events, and why the others were not used.
+/// Returns the share of used events, and the reasons why the other events were not used.
 std::string eventsText(const EventCounts& counts) {
   std::string text = fmt::format("{} of {} used", shareText(counts[EventFate::kUsed], counts.read),
                                  countText(counts.read));
@@ -316,7 +316,7 @@ std::string timeLine(const MapReport& report) {
                             1e-6 * static_cast<double>(report.peak_memory_bytes));
 }
 
-/// "window_s 0.5, min_depth_m 0.61; report.json says why".
+/// Returns text such as "window_s 0.5, min_depth_m 0.61; report.json says why".
 std::string chosenText(const std::vector<ChosenOption>& chosen) {
   std::string text;
   for (const ChosenOption& option : chosen) {

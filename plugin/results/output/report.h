@@ -28,12 +28,12 @@ struct MapExtent {
   Eigen::Vector3d max_m = Eigen::Vector3d::Zero();
 };
 
-/// @param outside the fraction of the points that lie outside, at each end of each axis; 0 for the
-/// box around all of them.
-/// @return nothing without points.
+/// Returns the box around the points of a map, std::nullopt if there are no points.
+/// @param outside the fraction of the points that lie outside of the box, at each end of each axis;
+/// 0 for the box around all points.
 std::optional<MapExtent> extentOf(const MapCloud& cloud, double outside = 0);
 
-/// How far the refinement moved the keyframes' poses.
+/// Distances and angles by which the refinement moved the keyframes' poses.
 struct PoseShift {
   double median_m = 0;
   double max_m = 0;
@@ -41,72 +41,72 @@ struct PoseShift {
   double max_rad = 0;
 };
 
-/// @param before and `after`: poses of the same keyframes, in the same order.
+/// Compares poses before and after. Both lists have the same keyframes in the same order.
 PoseShift shiftBetween(const std::vector<StampedPose>& before,
                        const std::vector<StampedPose>& after);
 
 /// The counts, times and options of a run: the content of report.json.
 struct MapReport {
-  std::vector<std::string> recording;  ///< The absolute names of its files.
+  std::vector<std::string> recording;  ///< Absolute names of the recording's files.
   MapperCounts counts;
-  std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
-  std::optional<LiveStatus> live;               ///< Of live operation.
-  std::uint64_t points = 0;                     ///< Of the exported map.
-  PixelCounts pixels;                           ///< Of all keyframes.
-  std::optional<MapExtent> extent;              ///< Of these points.
-  /// Of 0.1 to 99.9 % of them on each axis: a few wrong points lie far from all others.
+  std::vector<std::uint64_t> silent_keyframes;  ///< Keyframes without events of a camera.
+  std::optional<LiveStatus> live;               ///< The state of live operation.
+  std::uint64_t points = 0;                     ///< Number of points of the exported map.
+  PixelCounts pixels;                           ///< Pixels of all keyframes.
+  std::optional<MapExtent> extent;              ///< The box around all points.
+  /// The box of 0.1 to 99.9 % of the points on each axis: a few wrong points are far away.
   std::optional<MapExtent> most_extent;
-  double recording_s = 0;               ///< From the first event that was read to the last.
-  std::uint64_t peak_memory_bytes = 0;  ///< Of the process.
+  double recording_s = 0;               ///< Time from the first event that was read to the last.
+  std::uint64_t peak_memory_bytes = 0;  ///< Peak memory of the process.
   StageTimes times;
-  EventFusionOptions options;                 ///< As used.
-  std::vector<ChosenOption> chosen;           ///< Those of them that were automatic.
-  TrackerFaults faults;                       ///< Of the perturbed poses.
-  std::optional<RefinementState> refinement;  ///< Where poses were refined.
-  std::optional<PoseShift> pose_shift;        ///< By the refinement.
-  /// The value of `max_confidence = sequence`, where a first pass found it.
+  EventFusionOptions options;                 ///< The options as used.
+  std::vector<ChosenOption> chosen;           ///< The automatic options.
+  TrackerFaults faults;                       ///< The faults of the perturbed poses.
+  std::optional<RefinementState> refinement;  ///< The refinement, if poses were refined.
+  std::optional<PoseShift> pose_shift;        ///< The shift by the refinement.
+  /// The value of `max_confidence = sequence`, if a first pass found it.
   std::optional<double> sequence_maximum;
-  /// The view of the depth maps, and the distance of its camera to the nearest other selected one:
-  /// they turn depth into disparity. Nothing where the rig was never complete or has one camera.
+  /// View of the depth maps, and distance of its camera to the nearest other selected camera, for
+  /// disparity. std::nullopt if the rig was never complete or has one camera.
   std::optional<ReferenceView> view;
   std::optional<double> baseline_m;
-  /// The fraction of the recording that was mapped, where the run was interrupted.
+  /// The fraction of the recording that was mapped, if the run was interrupted.
   std::optional<double> stopped_at;
-  std::uint64_t skipped_events = 0;  ///< Bad ones that the reader left out.
+  std::uint64_t skipped_events = 0;  ///< Bad events that the reader left out.
   std::vector<Warning> warnings;
-  std::vector<std::string> doubts;  ///< Why the map rests on little evidence; usually none.
+  std::vector<std::string> doubts;  ///< Reasons why the map has little evidence; usually none.
 };
 
-/// Enters the number of points and their extents.
+/// Writes the number of points and their extents into the report.
 void describePoints(const MapCloud& cloud, MapReport& report);
 
-/// The report as indented JSON: events (total and per camera; read = used + without_pose +
-/// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (event_uses
-/// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, extent_m
-/// (min and max, frame `world`; absent without points), pixels (see PixelCounts), most_extent_m
-/// (the same of 0.1 to 99.9 % of the points on each axis), recording_seconds (from the first event
-/// to the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
-/// keyframes), votes_per_second, sorted_events, skipped_events (bad ones that the reader left out),
-/// refinement where poses were refined (registered keyframes, loops, failed_solves: minima that
-/// could not be computed, failures: errors, after which a keyframe keeps the tracker's motion,
-/// last_error, the learnt errors of the tracker, and under `moved` how far it moved poses), kernel,
-/// threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
-/// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
-/// live in live operation (drop_ratio, per camera what became of its events before the mapping,
-/// dropped_windows and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
-/// errors and last_error), warnings (each with name and text), doubtful (why the map rests on
-/// little evidence; absent where it does not), recording (its files), perturbation (the faults of
-/// the poses, if any), chosen (the automatic options: key, value and reason), options (all of them,
-/// with these values) and version. Bytes of names that are not UTF-8 become U+FFFD.
+/// Returns the report as indented JSON: events (total and per camera; read = used + without_pose +
+/// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (the sum of
+/// votes is event_uses x planes), keyframes, silent (keyframes per camera, sub-intervals), points,
+/// extent_m (min and max, frame `world`; absent without points), pixels (see PixelCounts),
+/// most_extent_m (the extent of 0.1 to 99.9 % of the points on each axis), recording_seconds (first
+/// event to last event), seconds (real time), cpu_seconds (processor time: once per run, for
+/// events, for keyframes), votes_per_second, sorted_events, skipped_events (bad events that the
+/// reader left out), refinement if poses were refined (registered keyframes; loops; failed_solves;
+/// failures: errors, after which a keyframe keeps the tracker's motion; last_error; the learnt
+/// errors of the tracker; moved: the shift of the poses), kernel, threads, peak_memory_bytes (of
+/// this process), reference_view and baseline_m if known, stopped_at if the run was interrupted
+/// (the fraction of the recording that was mapped), live in live operation (drop_ratio; counts of
+/// each camera's events before the mapping; windows_given_up and the reasons; late_events,
+/// pose_jumps, clock_steps, refused_poses, errors and last_error), warnings (each with name and
+/// text), doubtful (reasons why the map has little evidence; absent if there are none), recording
+/// (the files), perturbation (the faults of the poses, if any), chosen (the automatic options: key,
+/// value and reason), options (all options with the used values) and version. Bytes of names that
+/// are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
 
-/// The most memory that this process has had so far.
+/// Returns the peak memory of this process so far.
 std::uint64_t peakMemoryBytes();
 
-/// The result of a run in plain words, for the user: a line per fact, under 20 lines. A fact that
-/// is not known or does not apply has no line.
-/// @param kind `kDepth`: of one keyframe.
-/// @param folder with the results.
+/// Returns the result of a run in plain words, for the user: a line per fact, under 20 lines. A
+/// fact that is not known or does not apply has no line.
+/// @param kind `kDepth`: the result is one keyframe.
+/// @param folder the folder with the results.
 std::string summaryOf(const MapReport& report, OutputKind kind,
                       const std::filesystem::path& folder);
 

@@ -17,7 +17,7 @@ constexpr double kMargin = 0.04;
 
 std::string shortText(double value) { return fmt::format("{:.6g}", value); }
 
-/// The smallest of 1, 2, 5 times a power of ten that is `min_step` or more.
+/// Returns the smallest of 1, 2, 5 times a power of ten that is `min_step` or more.
 double roundStep(double min_step) {
   const double power = std::pow(10.0, std::floor(std::log10(min_step)));
   for (const double factor : {1.0, 2.0, 5.0}) {
@@ -30,7 +30,7 @@ std::vector<AxisTick> multiplesInside(const AxisRange& range, double step) {
   const double slack = 1e-9 * step;
   const double last = std::floor((range.to + slack) / step);
   std::vector<AxisTick> ticks;
-  // The sum makes 0 of -0.
+  // Adding 0.0 converts -0 to 0.
   for (double k = std::ceil((range.from - slack) / step) + 0.0; k <= last; ++k) {
     ticks.push_back({k * step, shortText(k * step)});
   }
@@ -47,7 +47,7 @@ std::vector<AxisTick> linearTicks(const AxisRange& range, int max_ticks) {
   return ticks;
 }
 
-/// Powers of ten times each factor inside the range; every `stride`-th power.
+/// Returns powers of ten times each factor inside the range; uses every `stride`-th power.
 std::vector<AxisTick> powersInside(const AxisRange& range, const std::vector<double>& factors,
                                    int stride) {
   const int first = static_cast<int>(std::floor(std::log10(range.from)));
@@ -74,7 +74,7 @@ std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int max_ticks) {
   return ticks;
 }
 
-/// The roundest values first, where their neighbours leave them space.
+/// Selects values in the order of roundness, if they have space beside the values so far.
 std::vector<AxisTick> inverseTicks(const AxisRange& range, int max_ticks) {
   static const std::vector<double> kRoundness[] = {{1}, {2, 5}, {1.5, 3}, {4, 7}, {1.2, 2.5, 6, 8}};
   std::vector<AxisTick> ticks;
@@ -138,7 +138,7 @@ namespace {
 
 constexpr int kPlotFont = cv::FONT_HERSHEY_SIMPLEX;
 
-/// Of the strokes of a text, in pixels.
+/// Returns the thickness of a text's strokes, in pixels.
 int thicknessOf(double scale) { return std::max(1, cvRound(1.7 * scale)); }
 
 }  // namespace
@@ -167,7 +167,7 @@ struct PlotFrame {
   AxisRange x;
   AxisRange y;
 
-  /// The pixel of a point in the picture. NaN for a value that a logarithmic axis cannot show.
+  /// Returns the pixel of a point. NaN for a value that a logarithmic axis cannot show.
   cv::Point2d pixelOf(const cv::Point2d& point) const {
     return {area.x + x.fractionAlong(point.x) * (area.width - 1),
             area.br().y - 1 - y.fractionAlong(point.y) * (area.height - 1)};
@@ -179,7 +179,7 @@ AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool is_x) {
   for (const Curve& curve : plot.curves) {
     for (const cv::Point2d& point : curve.points) values.push_back(is_x ? point.x : point.y);
   }
-  // The range includes a given end, so that the margin at the other end is right.
+  // A given end is also a value, so that the margin at the other end is correct.
   for (const auto& end : {axis.from, axis.to}) {
     if (end) values.push_back(*end);
   }
@@ -197,7 +197,7 @@ AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool is_x) {
   return range;
 }
 
-/// Widens the range with more pixels per unit.
+/// Widens the range of the axis with more pixels per unit.
 void makeUnitsEqual(AxisRange& x, AxisRange& y, cv::Size pixels) {
   const double per_pixel =
       std::max((x.to - x.from) / pixels.width, (y.to - y.from) / pixels.height);
@@ -225,7 +225,7 @@ void writeTextUpwards(cv::Mat3b& picture, const std::string& text, cv::Point cen
   upright(visible - target.tl()).copyTo(picture(visible));
 }
 
-/// Computes the frame of a plot: the picture without its labels; the ends of the axes fit the
+/// Computes the frame of a plot: the picture without its labels. The ends of the axes fit the
 /// curves.
 PlotFrame layOut(const CurvePlot& plot) {
   PlotFrame frame;
@@ -283,13 +283,13 @@ void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame)
             kPlotTitleScale);
 }
 
-/// Not NaN, and within the range of cv::line.
+/// Returns whether a pixel is not NaN and is within the range of cv::line.
 bool canBeDrawn(const cv::Point2d& pixel) {
   constexpr double kMaxPixel = 1e6;
   return std::abs(pixel.x) < kMaxPixel && std::abs(pixel.y) < kMaxPixel;
 }
 
-/// The uninterrupted lines of a curve, in pixels of the picture.
+/// Returns the uninterrupted lines of a curve, in pixels of the picture.
 std::vector<std::vector<cv::Point2d>> linesOf(const Curve& curve, const PlotFrame& frame) {
   std::vector<std::vector<cv::Point2d>> lines(1);
   for (const cv::Point2d& point : curve.points) {
@@ -321,8 +321,8 @@ void drawCurve(cv::Mat3b& picture, const Curve& curve, const PlotFrame& frame,
   }
 }
 
-/// Counts the positions on the curves that a rectangle with a gap around it would hide: eight
-/// between two points.
+/// Counts the positions on the curves that a rectangle with a gap around it would hide. Eight
+/// positions are checked between two points.
 int hiddenBy(const cv::Rect& rectangle, const CurvePlot& plot, const PlotFrame& frame) {
   constexpr int kBetween = 8;
   const cv::Rect box(rectangle.tl() - cv::Point(kPlotGap, kPlotGap),
@@ -343,7 +343,7 @@ int hiddenBy(const cv::Rect& rectangle, const CurvePlot& plot, const PlotFrame& 
   return hidden;
 }
 
-/// Tries the corners, the upper right first, and the middles of the left and right sides.
+/// Returns the best of four corners (the upper right is tried first) and two middles of the sides.
 cv::Rect legendBox(cv::Size size, const CurvePlot& plot, const PlotFrame& frame) {
   const cv::Point low = frame.area.tl() + cv::Point(kPlotGap, kPlotGap);
   const cv::Point high =

@@ -12,26 +12,26 @@
 namespace efm {
 namespace {
 
-// In pixels of a picture of up to 480 pixels.
+// Sizes in pixels, for a picture of up to 480 pixels.
 constexpr int kTitleHeight = 24;
 constexpr int kBarHeight = 12;
 constexpr int kBarGap = 6;
 constexpr int kTickHeight = 18;
 
-/// The size of text and bar.
+/// Returns the scale of text and bar.
 double scaleOf(int width) { return std::max(1.0, width / 480.0); }
 
-/// The values on a scale on which the axis is linear. Where the axis cannot show a value it is
-/// meaningless.
+/// Converts values to a scale on which the axis is linear. If the axis cannot show a value, its
+/// result is meaningless.
 cv::Mat1f linearised(const cv::Mat1f& values, AxisScale scale) {
   if (scale == AxisScale::kLinear) return values;
-  cv::Mat1f linear;  // not a header of the values, which are the caller's
+  cv::Mat1f linear;  // a new matrix: the values belong to the caller
   if (scale == AxisScale::kInverse) cv::divide(1.0, values, linear);
   if (scale == AxisScale::kLogarithmic) cv::log(values, linear);
   return linear;
 }
 
-/// Levels of the palette. `none` is 255 where there is no value.
+/// Returns levels of the palette. `none` becomes 255 for pixels without a value.
 cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
   const AxisRange& range = picture.range;
   const cv::Mat1f ends =
@@ -45,7 +45,7 @@ cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
   return levels;
 }
 
-/// The axis of depths between two limits: linear in inverse depth.
+/// Returns the axis of depths between two limits: linear in inverse depth.
 AxisRange depthAxis(const DepthPlanesOptions& limits) {
   return {limits.min_depth_m, limits.max_depth_m, AxisScale::kInverse};
 }
@@ -112,7 +112,7 @@ cv::Mat3b drawValues(const ValuePicture& picture) {
 
 namespace {
 
-/// Pixels. Sensors that are narrower are enlarged.
+/// Pixels. Images of narrower sensors are enlarged.
 constexpr int kMinFigureWidth = 640;
 
 double maximumOf(const cv::Mat1f& confidence) {
@@ -121,7 +121,7 @@ double maximumOf(const cv::Mat1f& confidence) {
   return maximum;
 }
 
-/// Light grey where the confidence is high. The root shows low ones, too.
+/// Returns light grey for high confidence. The square root makes low confidences visible, too.
 cv::Mat1b lightGrey(const cv::Mat1f& confidence) {
   constexpr double kDarkest = 60;  // levels below white
   const double maximum = maximumOf(confidence);
@@ -172,7 +172,7 @@ cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
 
 cv::Mat1b confidenceFigure(const cv::Mat1f& confidence) {
   const double maximum = maximumOf(confidence);
-  // Nothing in it has a colour, and one channel is encoded faster than three.
+  // The figure has no colours, and one channel is encoded faster than three channels.
   cv::Mat1b grey;
   cv::extractChannel(drawValues({"",
                                  confidence,
@@ -192,7 +192,7 @@ cv::Mat1b confidencePicture(const cv::Mat1f& confidence) {
 }
 
 cv::Mat3b eventPicture(const cv::Mat_<cv::Vec2i>& counts) {
-  constexpr int kFullColour = 3;  // events
+  constexpr int kFullColour = 3;  // difference in events
   cv::Mat3b picture(counts.size(), cv::Vec3b(255, 255, 255));
   for (int y = 0; y < counts.rows; ++y) {
     for (int x = 0; x < counts.cols; ++x) {

@@ -18,16 +18,16 @@
 namespace efm {
 namespace {
 
-// Pixels.
+// Sizes in pixels.
 constexpr int kMaxWidth = 1500;
 constexpr int kMaxHeight = 1500;
-constexpr int kMinWidth = 800;  // of the legend
+constexpr int kMinWidth = 800;  // the legend needs this width
 constexpr int kLabelHeight = 30;
 constexpr int kLegendHeight = 64;
 constexpr int kBorder = 8;
 constexpr int kViewGap = 24;
 
-constexpr double kViewMargin = 0.02;  // of an extent, at both ends
+constexpr double kViewMargin = 0.02;  // fraction of an extent, at both ends
 
 struct Extent {
   double low = std::numeric_limits<double>::infinity();
@@ -41,7 +41,7 @@ struct Extent {
   double length() const { return high - low; }
 };
 
-/// The positions that decide what is shown.
+/// The positions that must be visible in the views.
 class ShownPositions {
  public:
   ShownPositions(const MapCloud& cloud, const std::vector<StampedPose>& trajectory)
@@ -53,7 +53,7 @@ class ShownPositions {
     }
   }
 
-  /// Without the lowest and the highest percent of the points.
+  /// Returns the extent without the lowest and the highest percent of the points.
   Extent ofPoints(const Eigen::Vector3d& axis) const {
     std::vector<double> values(samples_.size());
     std::transform(samples_.begin(), samples_.end(), values.begin(),
@@ -80,14 +80,14 @@ class ShownPositions {
   std::vector<Eigen::Vector3d> samples_;
 };
 
-/// The length of the trajectory's extent along an axis.
+/// Returns the length of the trajectory's extent along an axis.
 double travelled(const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& axis) {
   Extent extent;
   for (const StampedPose& pose : trajectory) extent.add(pose.T_world_rig.translation.dot(axis));
   return extent.length();
 }
 
-/// Where the cameras look on average, without its part along `up`; short where they turn around.
+/// Returns the sum of the cameras' level viewing directions; it is short if they look everywhere.
 Eigen::Vector3d levelLook(const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& up) {
   Eigen::Vector3d look = Eigen::Vector3d::Zero();
   for (const StampedPose& pose : trajectory) {
@@ -96,8 +96,8 @@ Eigen::Vector3d levelLook(const std::vector<StampedPose>& trajectory, const Eige
   return look - look.dot(up) * up;
 }
 
-/// A direction across `up` such that a rectangle along it around the shown positions has the
-/// smallest area: along the walls of a room. An axis of the world if it is nearly as good.
+/// Returns the horizontal direction of the smallest rectangle around the positions: along the walls
+/// of a room. An axis of the world is preferred if it is nearly as good.
 Eigen::Vector3d levelAxis(const ShownPositions& positions, const Eigen::Vector3d& up) {
   constexpr double kNearly = 1.05;
   constexpr int kStepDeg = 3;
@@ -116,12 +116,12 @@ Eigen::Vector3d levelAxis(const ShownPositions& positions, const Eigen::Vector3d
   return best;
 }
 
-/// The views of a map along given axes.
+/// The axes of a map's views.
 struct Axes {
-  Eigen::Vector3d right, away, up;  // `away`: upwards in the top view, into the side view
+  Eigen::Vector3d right, away, up;  // `away`: upwards in the top view, forwards in the side view
 };
 
-/// Both views side by side or one above the other, with the larger scale.
+/// Both views, side by side or one above the other: the arrangement with the larger scale.
 struct Arrangement {
   bool side_by_side = false;
   double pixels_per_m = 0;
@@ -136,7 +136,7 @@ Arrangement arrange(const ShownPositions& positions, const Axes& axes) {
   result.width_m = lengthOf(axes.right);
   result.depth_m = lengthOf(axes.away);
   result.height_m = lengthOf(axes.up);
-  // Room for the trajectory of a map that is a line or a position.
+  // Space for the trajectory of a map that is a line or a single position.
   const double min_m =
       std::max({0.05 * result.width_m, 0.05 * result.depth_m, 0.05 * result.height_m, 0.1});
   for (double* length : {&result.width_m, &result.depth_m, &result.height_m}) {
@@ -169,8 +169,8 @@ MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& traje
   Axes axes;
   Arrangement arrangement;
   double best = 0;
-  // The side view looks as the cameras do, but not along a street: cameras that travel forwards
-  // are seen from the side.
+  // The side view has the cameras' viewing direction, with one exception: cameras that travel
+  // forwards, as in a street, are seen from the side.
   constexpr double kLookBonus = 1.4;
   const Eigen::Vector3d axis = levelAxis(positions, up);
   for (Eigen::Vector3d right : {axis, Eigen::Vector3d(up.cross(axis))}) {
@@ -224,7 +224,7 @@ constexpr double kLabelScale = 0.55;
 constexpr Palette kHeightPalette = Palette::kRainbow;
 const cv::Scalar kMapGrey = cv::Scalar::all(210);
 
-/// Adds a weight of 1 around a position, to the four nearest pixels.
+/// An image of points. Each point adds a weight of 1, distributed over the four nearest pixels.
 class Splats {
  public:
   explicit Splats(cv::Size size) : weights_(size, 0.0F), heights_(size, 0.0F) {}
@@ -239,7 +239,7 @@ class Splats {
     addTo(x + 1, y + 1, u * v, height);
   }
 
-  /// Colours of the mean height, on white: the more opaque the more points there are.
+  /// Returns the colours of the mean height, on white. Pixels with more points are more opaque.
   cv::Mat3b picture(double sigma) {
     cv::GaussianBlur(weights_, weights_, {}, sigma);
     cv::GaussianBlur(heights_, heights_, {}, sigma);
@@ -283,7 +283,7 @@ class Splats {
   }
 
   cv::Mat1f weights_;
-  cv::Mat1f heights_;  // sums, weighted
+  cv::Mat1f heights_;  // weighted sums
 };
 
 void drawPoints(cv::Mat3b& picture, const MapView& view, const MapCloud& cloud,
@@ -301,7 +301,7 @@ void drawPoints(cv::Mat3b& picture, const MapView& view, const MapCloud& cloud,
 
 /// Draws a path with a dot at its start and a ring at its end.
 /// @param pixels see `subpixel`.
-/// @param covers whether the path covers points, which need white around it.
+/// @param covers true if the path covers points; then it gets a white border.
 void drawPath(cv::Mat3b& picture, const std::vector<cv::Point>& pixels, bool covers) {
   const cv::Scalar white = cv::Scalar::all(255);
   const auto line = [&](int width, const cv::Scalar& colour) {
@@ -331,7 +331,7 @@ void drawTrajectory(cv::Mat3b& picture, const MapView& view,
   if (!pixels.empty()) drawPath(area, pixels, true);
 }
 
-/// 1, 2 or 5 times a power of ten.
+/// Returns the largest of 1, 2 or 5 times a power of ten that is at most `max_m`.
 double roundLength(double max_m) {
   const double power = std::pow(10.0, std::floor(std::log10(max_m)));
   for (const double factor : {5.0, 2.0}) {
@@ -364,7 +364,7 @@ cv::Mat3b drawMap(const MapCloud& cloud, const std::vector<StampedPose>& traject
     throw std::invalid_argument("a map without points and keyframes has no picture");
   }
   const MapLayout layout = layOutMap(cloud, trajectory);
-  // Few points on much paper are drawn larger.
+  // If there are few points in a large area, they are drawn larger.
   const double pixels_per_point =
       layout.top.area.area() / (1.0 + static_cast<double>(cloud.size()));
   const double sigma = std::clamp(

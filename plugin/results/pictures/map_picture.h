@@ -16,35 +16,35 @@ namespace efm {
 struct MapView {
   cv::Rect area;            ///< Pixels of the picture.
   Eigen::Vector3d right;    ///< Unit vector, frame `world`.
-  Eigen::Vector3d upwards;  ///< Unit vector across `right`: upwards in the picture.
-  Eigen::Vector3d p_world;  ///< Is drawn in the middle of the area.
+  Eigen::Vector3d upwards;  ///< Unit vector orthogonal to `right`: upwards in the picture.
+  Eigen::Vector3d p_world;  ///< The position in the middle of the area.
   double pixels_per_m = 1;
 
-  /// The pixel of a position in the picture; the centre of a pixel has whole coordinates.
+  /// Returns the pixel of a position; the centre of a pixel has whole coordinates.
   cv::Point2d pixelOf(const Eigen::Vector3d& p_world) const;
 };
 
-/// Where the views of a map stand in a picture, all with one scale.
+/// The places of a map's views in a picture. All views have the same scale.
 struct MapLayout {
-  cv::Size size;  ///< Of the whole picture, pixels.
+  cv::Size size;  ///< Size of the whole picture, pixels.
   MapView top;
   MapView side;
-  cv::Rect legend;      ///< Below the views.
-  AxisRange heights_m;  ///< Along `side.upwards`: the range of the colours.
+  cv::Rect legend;      ///< Place of the legend, below the views.
+  AxisRange heights_m;  ///< The range of the colours, along `side.upwards`.
 };
 
-/// Lays out the top view and the side view of a map, side by side or one above the other and turned
-/// around the direction up such that the scale is as large as possible. The views show 98 % of the
-/// points along each axis and the whole trajectory: far outliers do not change the scale.
+/// Lays out the top view and the side view of a map, side by side or one above the other. The map
+/// is turned around the vertical so that the scale is as large as possible. The views show 98 % of
+/// the points along each axis and the whole trajectory, so far outliers do not change the scale.
 /// @param cloud may be empty.
-/// @param trajectory T_world_ref of the keyframes; not empty where there are no points.
+/// @param trajectory T_world_ref of the keyframes; not empty if there are no points.
 MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory);
 
-/// A map from above and from the side, for a paper: the points coloured by height and the denser
-/// the more opaque, the trajectory, a scale bar in metres. Up to 1500 pixels wide and high.
-/// @param cloud may be empty: then the picture has the trajectory alone.
+/// Draws a map from above and from the side, for a paper: points, trajectory and a scale bar in
+/// metres. Points are coloured by height; dense points are more opaque. At most 1500 x 1500 pixels.
+/// @param cloud may be empty: then the picture shows only the trajectory.
 /// @param trajectory T_world_ref of the keyframes.
-/// @param voxel_size_m of the map: points are drawn no smaller than their voxels.
+/// @param voxel_size_m voxel size of the map. Points are drawn as large as their voxels or larger.
 cv::Mat3b drawMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory,
                   double voxel_size_m);
 

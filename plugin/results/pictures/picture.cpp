@@ -59,7 +59,7 @@ cv::Mat3b oneBelowAnother(const std::vector<cv::Mat3b>& pictures) {
 
 namespace {
 
-/// The colours of the levels 0 to 255: a part of one of OpenCV's colour maps.
+/// Returns the colours of the levels 0 to 255: a part of one of OpenCV's colour maps.
 cv::Mat3b tableOf(Palette palette) {
   struct {
     cv::ColormapTypes map;
@@ -91,7 +91,7 @@ cv::Mat3b coloured(const cv::Mat1b& levels, Palette palette) {
 
 Eigen::Vector3d upwardOf(const std::vector<StampedPose>& trajectory) {
   constexpr int kSteps = 100;
-  constexpr double kPull = 0.05;  // towards -y, which decides where the x axes do not
+  constexpr double kPull = 0.05;  // weak pull towards -y, for cases that the x axes leave open
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
   for (const StampedPose& pose : trajectory) {

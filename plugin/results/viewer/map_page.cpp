@@ -63,7 +63,7 @@ bool isBetter(const MapPoint& a, const MapPoint& b) {
   return std::tie(a.support, a.intensity) > std::tie(b.support, b.intensity);
 }
 
-/// A stride near the golden section that visits each of n points once.
+/// Returns a stride near the golden section with which each of n points is visited once.
 std::size_t longStride(std::size_t n) {
   auto stride = static_cast<std::size_t>(0.6180339887 * static_cast<double>(n)) | 1U;
   while (std::gcd(stride, n) > 1) ++stride;
@@ -103,11 +103,11 @@ PagePoints::PagePoints(const MapCloud& cloud, double voxel_size_m, std::size_t l
   if (cloud.size() > limit) {
     double cell_m = voxel_size_m;
     const auto wanted = 0.97 * static_cast<double>(limit);
-    constexpr int kMaxTrials = 20;  // four to ten suffice
+    constexpr int kMaxTrials = 20;  // 4 to 10 trials are enough
     for (int trial = 0; trial < kMaxTrials; ++trial) {
       const double ratio = countCells(cell_m) / wanted;
       if (ratio > 0.95 && ratio < 1.01) break;
-      // A map is made of surfaces: the number of their cells falls with the square of the edge.
+      // A map consists of surfaces: the number of cells falls with the square of the cell's edge.
       cell_m *= std::sqrt(ratio);
     }
     while (!thin(cell_m)) cell_m *= 1.03;
@@ -116,8 +116,8 @@ PagePoints::PagePoints(const MapCloud& cloud, double voxel_size_m, std::size_t l
   stride_ = longStride(size());
 }
 
-/// An estimate of the number of cells that have points, from a fraction of all cells: a hash
-/// selects them, some 20,000 of those that are wanted.
+/// Estimates the number of cells that have points, from a fraction of all cells that a hash
+/// selects. About 20,000 of the wanted cells are in the fraction.
 double PagePoints::countCells(double cell_m) const {
   const std::uint64_t divisor = limit_ / 20'000 + 1;
   std::unordered_set<std::uint64_t> cells;
@@ -128,7 +128,7 @@ double PagePoints::countCells(double cell_m) const {
   return static_cast<double>(divisor) * static_cast<double>(cells.size());
 }
 
-/// @return false as soon as there are too many cells.
+/// Subsamples the points. @return false as soon as there are too many cells.
 bool PagePoints::thin(double cell_m) {
   std::size_t slots = 16;
   while (slots < 2 * limit_) slots *= 2;
@@ -188,7 +188,7 @@ PagePoint PagePoints::at(std::size_t i) const {
 
 namespace {
 
-/// Joins blocks of factor x factor pixels: the sum of their events.
+/// Joins blocks of factor x factor pixels to one pixel with the sum of their events.
 cv::Mat_<cv::Vec2i> reduced(const cv::Mat_<cv::Vec2i>& events, int factor) {
   if (factor == 1) return events;
   cv::Mat_<cv::Vec2i> small =
@@ -207,7 +207,7 @@ void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& 
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
   KeyframePicture added;
   const cv::Mat1f reduced_m = reducedDepth(depth_m, kMaxWidth);
-  // Half the size of kRuns, 2 ms a picture instead of 0.7.
+  // kSmall needs half the size of kRuns, and 2 ms per picture instead of 0.7 ms.
   constexpr PngPacking kPacking = PngPacking::kSmall;
   added.depth = encodePng(depthPicture(reduced_m, limits_, Palette::kBrightToDark), kPacking);
   if (!events.empty()) added.events = encodePng(eventPicture(reduced(events, factor)), kPacking);
@@ -230,10 +230,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Where the data stand in the page's source.
+/// The place of the data in the page's source.
 constexpr std::string_view kDataMark = "<!-- data -->";
 
-/// JSON for the inside of a script element, which "</script>" or "<!--" in a text would end.
+/// Escapes JSON for a script element: "</script>" or "<!--" in a text would end the element.
 std::string inScript(std::string json) {
   constexpr std::string_view kEscaped = "\\u003c";
   for (std::size_t at = json.find('<'); at != std::string::npos; at = json.find('<', at)) {
