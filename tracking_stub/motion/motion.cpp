@@ -71,7 +71,7 @@ Rigid3 between(const StampedPose& a, const StampedPose& b, std::int64_t t_ns) {
                      secondsBetween(a.t_ns, t_ns) / secondsBetween(a.t_ns, b.t_ns));
 }
 
-/// Distance of each inner pose from the line between its neighbours, in metres and in radians.
+/// Returns the distance of each inner pose from the line between its neighbours: metres, radians.
 std::pair<std::vector<double>, std::vector<double>> distancesToLine(const Poses& poses) {
   std::vector<double> metres(poses.size(), 0.0);
   std::vector<double> radians(poses.size(), 0.0);
@@ -84,7 +84,7 @@ std::pair<std::vector<double>, std::vector<double>> distancesToLine(const Poses&
   return {metres, radians};
 }
 
-/// Marks local maxima above the limit only: half of a jump also appears in the adjacent poses.
+/// Marks only local maxima above the limit: half of a jump also appears in the adjacent poses.
 void markJumps(const std::vector<double>& distances, std::vector<bool>& jumps) {
   constexpr double kTimesMedian = 8;
   std::vector<double> reordered = distances;
@@ -138,8 +138,8 @@ Poses resampled(const Poses& poses, std::int64_t period_ns) {
   return even;
 }
 
-/// The right half of a sinc under a Hann window. The half width of the window is two periods of the
-/// cutoff. The sum over both halves is 1.
+/// Returns the right half of a sinc under a Hann window. The half width of the window is two
+/// periods of the cutoff frequency. The sum over both halves is 1.
 std::vector<double> lowPass(double cutoff_hz, double period_s) {
   const double half_width_s = 2 / cutoff_hz;
   const int taps = static_cast<int>(std::floor(half_width_s / period_s));
@@ -156,8 +156,8 @@ std::vector<double> lowPass(double cutoff_hz, double period_s) {
   return weights;
 }
 
-/// The pose at an index, also beyond an end. There the motion is mirrored at the end's point, so
-/// the end keeps its position, speed and rate of rotation.
+/// Returns the pose at an index, which may be beyond an end. Beyond an end the motion is mirrored
+/// at the end pose, so the end keeps its position, speed and rate of rotation.
 Rigid3 extended(const Poses& poses, std::ptrdiff_t i) {
   const auto last = static_cast<std::ptrdiff_t>(poses.size()) - 1;
   const auto at = [&](std::ptrdiff_t k) -> const Rigid3& {

@@ -15,23 +15,23 @@ namespace efm {
 class Motion {
  public:
   virtual ~Motion() = default;
-  /// T_world_rig. Thread-safe.
+  /// Returns T_world_rig. Thread-safe.
   virtual Rigid3 poseAt(std::int64_t t_ns) const = 0;
 };
 
 struct LoopMotionOptions {
-  std::int64_t start_ns = 0;  ///< The rig is on the +x axis of the ellipse then.
-  double period_s = 8;        ///< Of one loop, above 0.
-  double radius_x_m = 1;      ///< Half axes of the ellipse.
+  std::int64_t start_ns = 0;  ///< Time at which the rig is on the +x axis of the ellipse.
+  double period_s = 8;        ///< Duration of one loop, above 0.
+  double radius_x_m = 1;      ///< Half axes of the ellipse, in x and y.
   double radius_y_m = 1;
-  double height_m = 1.2;  ///< Above the origin.
+  double height_m = 1.2;  ///< Height above the origin.
   /// Viewing direction, counter-clockwise from above: 0 is outwards, pi/2 is forwards.
   double heading_rad = 0;
-  /// Added motion, in the frame of the camera on the loop. Optional.
+  /// Additional motion, in the frame of the camera on the loop. May be null.
   std::shared_ptr<const Motion> sway;
 };
 
-/// Goes around the world's z axis on an ellipse, counter-clockwise and at a constant rate. Each
+/// A motion around the world's z axis on an ellipse, counter-clockwise and at a constant rate. Each
 /// loop ends at its first pose. The camera (x right, y down, z forward) is level without the sway.
 class LoopMotion : public Motion {
  public:
@@ -42,7 +42,7 @@ class LoopMotion : public Motion {
   LoopMotionOptions options_;
 };
 
-/// amplitude * sin(2 pi frequency t + phase).
+/// The function amplitude * sin(2 pi frequency t + phase).
 struct Sine {
   double amplitude = 0;  ///< Metres or radians.
   double frequency_hz = 0;
@@ -50,15 +50,15 @@ struct Sine {
 };
 
 struct SmoothMotionOptions {
-  std::int64_t start_ns = 0;                           ///< t = 0 of the sines.
+  std::int64_t start_ns = 0;                           ///< Time t = 0 of the sines.
   Rigid3 T_world_center;                               ///< The rig moves around this pose.
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< Along the axes of `center`, m/s.
-  std::array<std::vector<Sine>, 3> translation;        ///< Along the axes of `center`, metres.
-  std::array<std::vector<Sine>, 3> rotation;           ///< A rotation vector in `center`, radians.
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< Velocity in `center`, m/s.
+  std::array<std::vector<Sine>, 3> translation;  ///< Sines along the axes of `center`, metres.
+  std::array<std::vector<Sine>, 3> rotation;     ///< A rotation vector in `center`, radians.
 };
 
-/// Hand-held motion: a constant velocity and, in each of the six degrees of freedom, a sum of
-/// sines.
+/// A hand-held motion: a constant velocity and a sum of sines in each of the six degrees of
+/// freedom.
 class SmoothMotion : public Motion {
  public:
   explicit SmoothMotion(const SmoothMotionOptions& options) : options_(options) {}
@@ -69,19 +69,19 @@ class SmoothMotion : public Motion {
 };
 
 /// Smooths measured poses. A single pose that jumps is removed: its distance from the line between
-/// its neighbours is over 8 times the median. The others are resampled every 5 ms, also across gaps
-/// of up to 1 s, and filtered without delay by a windowed sinc, low-pass at 10 Hz: positions, and
-/// rotations in the tangent space at each sample. Poses may be in any order; of equal times the
-/// first counts.
+/// its neighbours is over 8 times the median. The other poses are resampled every 5 ms, also across
+/// gaps of up to 1 s. A windowed sinc, a low-pass at 10 Hz without delay, filters positions, and
+/// rotations in the tangent space at each sample. Poses may be in any order. If two poses have the
+/// same time, the first one is used.
 std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses);
 
-/// The first time from which a recording moves, over half a second, with at least half of its mean
-/// speed. The time of the first pose where it never moves.
-/// @param poses in order of time, at least one.
+/// Returns the start of the first half second in which a recording moves with at least half of its
+/// mean speed. Returns the time of the first pose if the recording never moves.
+/// @param poses at least one pose, in the order of time.
 std::int64_t startOfMotion(const std::vector<StampedPose>& poses);
 
-/// The motion through evenly spaced poses: linear in position, slerp in rotation, and at rest
-/// before the first pose and after the last.
+/// The motion through evenly spaced poses: linear in position and slerp in rotation. It is at rest
+/// before the first pose and after the last pose.
 class SampledMotion : public Motion {
  public:
   explicit SampledMotion(std::vector<StampedPose> poses);

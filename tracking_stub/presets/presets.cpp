@@ -15,19 +15,19 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The start of every preset.
+/// Start time of every preset.
 constexpr std::int64_t kPresetStartNs = kNanosecondsPerSecond;
 
-/// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
-/// is up.
+/// Returns R_world_cam of a level camera (x right, y down, z forward) that looks along +y in a
+/// world whose z axis is up.
 Eigen::Quaterniond lookingAlongY() {
   Eigen::Matrix3d R_world_cam;
   R_world_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   return Eigen::Quaterniond(R_world_cam);
 }
 
-/// A preset without scene, rig and motion.
-/// @param threshold contrast threshold of both polarities.
+/// Returns a preset without scene, rig and motion.
+/// @param threshold contrast threshold of both polarities, in log intensity.
 Simulation emptyPreset(double duration_s, double threshold, std::uint64_t seed) {
   Simulation simulation;
   simulation.start_ns = kPresetStartNs;
@@ -81,8 +81,8 @@ std::shared_ptr<const Motion> deskMotion() {
   options.T_world_center.rotation =
       lookingAlongY() * Eigen::AngleAxisd(radians(-15), Vector3d::UnitX());
   options.T_world_center.translation = {-0.05, 0, 0.68};
-  // A quarter of a period apart, x and y make a circle: the camera never rests, and edges of every
-  // orientation have parallax.
+  // The phases of x and y differ by a quarter of a period, which makes a circle: the camera never
+  // rests, and edges of every orientation have parallax.
   options.translation[0] = {{0.09, 0.43, 0.0}, {0.010, 1.7, 0.9}};
   options.translation[1] = {{0.12, 0.48, 1.3}, {0.010, 1.9, 2.5}};
   options.translation[2] = {{0.06, 0.60, 3.6}, {0.006, 1.5, 0.4}};
@@ -92,8 +92,8 @@ std::shared_ptr<const Motion> deskMotion() {
   return std::make_shared<SmoothMotion>(options);
 }
 
-/// A hand-held stereo pair looks over a cluttered desk into a room. World: x right, y into the
-/// room, z up, the desk's top at z = 0. About a million events per camera.
+/// Makes a hand-held stereo pair that looks over a cluttered desk into a room. World: x right, y
+/// into the room, z up, the desk's top at z = 0. About a million events per camera.
 Simulation makeDeskStereo(std::uint64_t seed) {
   constexpr double kFocalPx = 226;
   Simulation simulation = emptyPreset(2, 0.21, seed);
@@ -106,8 +106,8 @@ Simulation makeDeskStereo(std::uint64_t seed) {
   return simulation;
 }
 
-/// A stereo pair on a car's roof, 1.9 m above the road, drives down a street at 8 m/s. World: y
-/// along the street, z up, the road at z = 0. Some pixels see the sky.
+/// Makes a stereo pair on a car's roof, 1.9 m above the road, that drives along a street at 8 m/s.
+/// World: y along the street, z up, the road at z = 0. Some pixels see the sky.
 Simulation makeDriveStereo(std::uint64_t seed) {
   constexpr double kBaselineM = 0.60;
   constexpr double kSpeed = 8;  // m/s
@@ -128,7 +128,7 @@ Simulation makeDriveStereo(std::uint64_t seed) {
   // The pair is in the middle of the car.
   motion.T_world_center.translation = {-0.5 * kBaselineM, 0, 1.9};
   motion.velocity = {0, 0, kSpeed};  // along the camera's axes: forwards
-  // Within the lane, and up and down on the springs.
+  // Sideways within the lane, and up and down on the springs.
   motion.translation[0] = {{0.15, 0.35, 0.2}};
   motion.translation[1] = {{0.015, 1.5, 0.4}};
   motion.rotation[0] = {{radians(0.25), 1.5, 1.0}};
@@ -139,20 +139,20 @@ Simulation makeDriveStereo(std::uint64_t seed) {
   simulation.scene = makeStreet(street);
   simulation.rig = makeStereoRig(model, kBaselineM);
   simulation.motion = std::make_shared<SmoothMotion>(motion);
-  // The road right before the car moves six times as fast as most of the image. Its edges are
-  // softer: under a pixel's blur, a step of 1 misplaces an edge by 0.15 pixels.
+  // The road directly before the car moves six times as fast as most of the image. Its edges are
+  // softer: with a blur of a pixel, a step of 1 misplaces an edge by 0.15 pixels.
   simulation.max_step_px = 1;
   simulation.truth_cell_m = 0.05;
   return simulation;
 }
 
-/// A stereo pair of high resolution in a furnished room. World: z up. About 2.8 million events per
-/// camera.
+/// Makes a stereo pair of high resolution in a furnished room. World: z up. About 2.8 million
+/// events per camera.
 Simulation makeHdStereo(std::uint64_t seed) {
   RoomOptions room;
   room.size_m = {4.8, 4.2, 2.6};
   room.furniture_depth_m = 0.7;
-  room.nearest_m = 1.8;  // edges are a little softer on nearer surfaces
+  room.nearest_m = 1.8;  // edges on nearer surfaces are slightly softer
   room.focal_px = 900;
   room.seed = seed;
 
@@ -175,12 +175,12 @@ Simulation makeHdStereo(std::uint64_t seed) {
   simulation.rig.cameras[1].model.fx = simulation.rig.cameras[1].model.fy = 904;
   simulation.rig.cameras[1].model.coefficients = {-0.11, 0.07, -0.0003, 0.0005};
   simulation.motion = std::make_shared<SmoothMotion>(motion);
-  simulation.max_step_px = 0.5;  // misplaces an edge by 0.04 pixels at most
+  simulation.max_step_px = 0.5;  // misplaces an edge by at most 0.04 pixels
   return simulation;
 }
 
-/// The cameras of desk_stereo before thin poles, 3 to 6 pixels wide, and a wall behind them. World:
-/// y forward, z up, the origin at the cameras.
+/// Makes the cameras of desk_stereo in front of thin poles, 3 to 6 pixels wide, and a wall behind
+/// the poles. World: y forward, z up, the origin at the cameras.
 Simulation makePolesStereo(std::uint64_t seed) {
   PolesOptions poles;
   poles.nearest_m = 1.05;
@@ -206,8 +206,8 @@ Simulation makePolesStereo(std::uint64_t seed) {
   return simulation;
 }
 
-/// The cameras of desk_stereo go once around in a furnished room and look outwards; the last pose
-/// is the first pose. World: origin in the middle of the floor, z up.
+/// Makes the cameras of desk_stereo move once around in a furnished room and look outwards. The
+/// last pose is the first pose. World: origin in the middle of the floor, z up.
 Simulation makeRoomStereo(std::uint64_t seed) {
   constexpr double kDurationS = 8;
   RoomOptions room;
@@ -216,7 +216,7 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   room.focal_px = 226;
   room.seed = seed;
 
-  // A hand's sway. Whole periods fit the loop, so that it closes.
+  // The sway of a hand. The loop has whole periods of the sway, so that the loop closes.
   SmoothMotionOptions sway;
   sway.start_ns = kPresetStartNs;
   const double loop_hz = 1 / kDurationS;
@@ -240,13 +240,13 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   simulation.scene = makeRoom(room);
   simulation.rig = makeStereoRig(makePinhole(346, 260, room.focal_px), 0.10);
   simulation.motion = std::make_shared<LoopMotion>(loop);
-  // The rotation moves the image 1.25 pixels in the corners and 0.8 in the middle. This misplaces
-  // an edge by at most 0.25 and 0.1 pixels, forwards as often as back.
+  // The rotation moves the image by 1.25 pixels in the corners and 0.8 pixels in the middle. This
+  // misplaces an edge by at most 0.25 and 0.1 pixels, with both signs equally often.
   simulation.max_step_px = 1.25;
   return simulation;
 }
 
-/// A board or box before the camera, its front rotated to the right by `right_deg`.
+/// Adds a board or box before the camera; its front is rotated to the right by `right_deg`.
 void addBoard(Scene& scene, const Vector3d& center, const Vector3d& size_m, double right_deg,
               const Scene::Painter& paint) {
   Rigid3 T_world_board;
@@ -274,9 +274,9 @@ Scene sliderScene(std::uint64_t seed, double focal_px) {
   return scene;
 }
 
-/// One camera on a linear slider passes boards and boxes, like `slider_depth` of the Event Camera
-/// Dataset (Mueggler et al., IJRR 2017). It does not rotate, so edges along the motion fire no
-/// events and have no depth. World: the camera's frame in the middle of the path.
+/// Makes a camera on a linear slider that passes boards and boxes, like `slider_depth` of the Event
+/// Camera Dataset (Mueggler et al., IJRR 2017). It does not rotate, so edges along the motion fire
+/// no events and have no depth. World: the camera's frame in the middle of the path.
 Simulation makeSlider(std::uint64_t seed) {
   constexpr double kFocalPx = 335;
   constexpr double kSpeed = 0.32;  // m/s
@@ -305,7 +305,7 @@ CameraModel makeFisheye(double focal_px, const std::vector<double>& coefficients
   return model;
 }
 
-/// A rotation about y (to the right), x (up) and z (clockwise), in this order. Degrees.
+/// Returns a rotation about y (to the right), x (up) and z (clockwise), in this order. Degrees.
 Eigen::Quaterniond rotationOf(double right, double up, double clockwise) {
   return Eigen::AngleAxisd(radians(right), Vector3d::UnitY()) *
          Eigen::AngleAxisd(radians(up), Vector3d::UnitX()) *
@@ -339,10 +339,10 @@ std::shared_ptr<const Motion> trinocularMotion() {
   return std::make_shared<SmoothMotion>(options);
 }
 
-/// Three cameras, each with its own calibration, look into a corner of a furnished room. Camera 1
-/// is 0.16 m to the right and looks slightly inwards. Camera 2 is 0.14 m above the middle of the
-/// other two, tilted down, and rotated by 90 degrees about its axis. All see the middle of camera
-/// 0's view. World: z up.
+/// Makes three cameras, each with its own calibration, that look into a corner of a furnished room.
+/// Camera 1 is 0.16 m to the right of camera 0 and looks slightly inwards. Camera 2 is 0.14 m above
+/// the middle of cameras 0 and 1, tilted down, and rotated by 90 degrees about its axis. All
+/// cameras see the middle of camera 0's view. World: z up.
 Simulation makeTrinocular(std::uint64_t seed) {
   RoomOptions room;
   room.size_m = {4.6, 4.4, 2.6};

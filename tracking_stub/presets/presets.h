@@ -19,7 +19,7 @@ namespace efm {
 
 inline double radians(double deg) { return deg * kPi / 180; }
 
-/// No distortion, the principal point in the middle.
+/// Returns a camera without distortion, with the principal point in the middle.
 inline CameraModel makePinhole(int width, int height, double focal_px) {
   CameraModel model;
   model.width = width;
@@ -30,8 +30,8 @@ inline CameraModel makePinhole(int width, int height, double focal_px) {
   return model;
 }
 
-/// Two equal cameras, the second `baseline_m` to the right of the first. The rig's frame is the
-/// first.
+/// Returns two equal cameras. The second is `baseline_m` to the right of the first. The rig's frame
+/// is the frame of the first camera.
 inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   Rig rig;
   rig.cameras.resize(2);
@@ -40,7 +40,7 @@ inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   return rig;
 }
 
-/// The function with the name that an option has. Also checks the duration.
+/// Returns the function whose name is an option's value. Also checks the duration.
 template <typename Make, std::size_t N>
 Make makerIn(const NamedChoice<Make> (&makers)[N], const std::string& option,
              const std::string& name, const std::optional<double>& duration_s) {
@@ -58,20 +58,20 @@ Make makerIn(const NamedChoice<Make> (&makers)[N], const std::string& option,
   return maker;
 }
 
-/// The presets: simulations that are ready to run. Each starts at t = 1 s. README.md has a table of
-/// their cameras, durations and depths.
+/// The presets: simulations that are ready to run. Each preset starts at t = 1 s. README.md has a
+/// table of their cameras, durations and depths.
 
 struct SimulationOptions {
   std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
-  /// Seconds, 0.001 to 600. Default: the preset's duration.
+  /// Duration in seconds, 0.001 to 600. Default: the preset's duration.
   std::optional<double> duration_s = std::nullopt;
-  /// Seed of everything random: the paintings and the initial memory of the pixels.
+  /// Seed of all random values: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
 };
 
 std::vector<std::string> simulationPresets();
 
-/// Scene, rig and motion of a preset.
+/// Makes scene, rig and motion of a preset.
 Simulation makeSimulation(const SimulationOptions& options = {});
 
 struct TrajectorySimulationOptions {
@@ -82,18 +82,18 @@ struct TrajectorySimulationOptions {
   std::string scene = "room";
   /// Start time in the trajectory's clock. Default: `startOfMotion`.
   std::optional<std::int64_t> start_ns;
-  /// Seconds, 0.001 to 600. Default: 5, or less where the trajectory ends earlier.
+  /// Duration in seconds, 0.001 to 600. Default: 5, or less if the trajectory ends earlier.
   std::optional<double> duration_s = std::nullopt;
   std::uint64_t seed = 1;
 };
 
-/// The names of the scenes that can be built around a trajectory.
+/// Returns the names of the scenes that can be built around a trajectory.
 std::vector<std::string> simulationScenes();
 
 /// Moves a rig along a measured trajectory. The trajectory is smoothed (see `smoothTrajectory`),
 /// and the smoothed trajectory is the truth. The scene is built around the simulated part of the
-/// path. Its vertical is the mean y axis of the cameras.
-/// @param poses T_world_cam0, where camera 0 is the rig's frame.
+/// path. The scene's direction down is the mean y axis of the cameras.
+/// @param poses T_world_cam0. The rig's frame is the frame of camera 0.
 Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                                     const std::vector<StampedPose>& poses, const Rig& rig);
 

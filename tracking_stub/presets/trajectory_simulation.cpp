@@ -16,13 +16,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The path of camera 0. The scene is built around it.
+/// The path of camera 0. The scene is built around this path.
 struct CameraPath {
   std::vector<Vector3d> positions;  // frame `level`
   Eigen::AlignedBox3d box;          // around the positions
   Rigid3 T_world_level;             // y: the mean viewing direction; z: up
-  double focal_px = 0;              // of the camera with the longest focal length
-  double half_view = 0;             // of the widest camera, to the side at a depth of 1 m
+  double focal_px = 0;              // the longest focal length of all cameras
+  double half_view = 0;             // half of the widest camera's view at a depth of 1 m, metres
   std::uint64_t seed = 0;
 };
 
@@ -33,7 +33,7 @@ Eigen::Quaterniond levelFrame(const std::vector<Rigid3>& T_world_cams) {
     down += T_world_cam.rotation * Vector3d::UnitY();
     ahead += T_world_cam.rotation * Vector3d::UnitZ();
   }
-  // A camera that looks in all directions has no mean direction: its first direction counts.
+  // A camera that looks in all directions has no mean direction: its first direction is used.
   const auto n = static_cast<double>(T_world_cams.size());
   if (down.norm() < 0.1 * n) down = T_world_cams.front().rotation * Vector3d::UnitY();
   const Vector3d up = -down.normalized();
@@ -71,7 +71,7 @@ CameraPath pathOf(const Simulation& simulation) {
   return path;
 }
 
-/// Moves a scene: its origin goes to a position in frame `level`.
+/// Moves a scene so that its origin is at a position in frame `level`.
 Scene movedTo(Scene scene, const CameraPath& path, const Vector3d& origin_level) {
   Rigid3 T_level_scene;
   T_level_scene.translation = origin_level;
@@ -126,7 +126,7 @@ constexpr NamedChoice<MakeScene> kScenes[] = {
     {polesBefore, "poles"},
 };
 
-/// The poses of a time interval and of 2 s before and after it, for smoothing.
+/// Returns the poses of a time interval and of 2 s before and after the interval, for smoothing.
 std::vector<StampedPose> posesAround(const std::vector<StampedPose>& poses, std::int64_t start_ns,
                                      std::int64_t end_ns) {
   constexpr std::int64_t kMarginNs = 2 * kNanosecondsPerSecond;

@@ -25,7 +25,7 @@ double at(const Eigen::Vector3d& linear, const Eigen::Vector2d& ray) {
   return linear.x() * ray.x() + linear.y() * ray.y() + linear.z();
 }
 
-/// The max of a linear function on a tile.
+/// Returns the maximum of a linear function on a tile.
 double maximum(const Eigen::Vector3d& linear, const Eigen::Vector2d& center,
                const Eigen::Vector2d& half_size) {
   return at(linear, center) + std::abs(linear.x()) * half_size.x() +
@@ -44,7 +44,7 @@ SceneView::SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBou
     const Rectangle& r = scene.rectangle(surface);
     const Eigen::Vector3d center_from_corner = T_world_cam.translation - r.corner;
     const double height = r.normal().dot(center_from_corner);
-    if (!(height > 0)) continue;  // visible from behind only
+    if (!(height > 0)) continue;  // the camera is behind the surface
     Facet facet;
     facet.surface = surface;
     facet.inverse_depth = R_cam_world * r.normal() / -height;
@@ -64,7 +64,7 @@ SceneView::SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBou
     for (int column = 0; column < kTileColumns; ++column) {
       const Eigen::Vector2d center =
           bounds.min + tile_size.cwiseProduct(Eigen::Vector2d(column + 0.5, row + 0.5));
-      // Slightly enlarged: with rounding errors, too, the tile of a ray must list its surface.
+      // Slightly enlarged: in spite of rounding errors, a ray's tile must list the ray's surface.
       fillTile(center, 0.5001 * tile_size, tiles_[tileIndex(column, row)]);
     }
   }
@@ -100,7 +100,7 @@ const std::vector<SceneView::Candidate>& SceneView::tileOf(const Eigen::Vector2d
 ViewHit SceneView::cast(const Eigen::Vector2d& ray) const {
   ViewHit hit;
   for (const Candidate& candidate : tileOf(ray)) {
-    if (candidate.max_inverse_depth <= hit.inverse_depth) break;  // all others are farther
+    if (candidate.max_inverse_depth <= hit.inverse_depth) break;  // the rest is farther away
     const Facet& f = facets_[static_cast<std::size_t>(candidate.facet)];
     const double inverse_depth = at(f.inverse_depth, ray);
     if (!(inverse_depth > hit.inverse_depth)) continue;
@@ -127,8 +127,8 @@ float SceneView::logIntensity(const ViewHit& hit, const Eigen::Vector2d& ray,
   const double depth = 1 / hit.inverse_depth;
   const double u = at(f.u_over_depth, ray) * depth;
   const double v = at(f.v_over_depth, ray) * depth;
-  // The derivative of the surface point by the ray. An oblique pixel is long in one direction: the
-  // blur is the root mean square of both directions.
+  // The derivative of the surface point by the ray. A pixel on an oblique surface is long in one
+  // direction: the blur is the root mean square of both directions.
   const Eigen::Vector2d du = (f.u_over_depth - u * f.inverse_depth).head<2>() * depth;
   const Eigen::Vector2d dv = (f.v_over_depth - v * f.inverse_depth).head<2>() * depth;
   const double metres_per_ray = std::sqrt(0.5 * (du.squaredNorm() + dv.squaredNorm()));
@@ -139,7 +139,7 @@ PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(mo
   requireOption(width_ >= 2, "width", width_, "at least 2 pixels to be simulated");
   requireOption(height_ >= 2, "height", height_, "at least 2 pixels to be simulated");
   model.validate();
-  // Not the mapping's table: it has floats, whose rounding would be an error of the truth.
+  // The mapping's table is not used: it has floats, whose rounding would be an error of the truth.
   const LensInverse lens(model);
   std::vector<Eigen::Vector2d> table;
   table.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -159,7 +159,7 @@ PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(mo
     for (int x = 0; x < width_; ++x) {
       PixelRay& pixel = rays_.emplace_back();
       if (!has_ray(x, y)) continue;
-      // Towards pixels that have a ray, too: not over the border of the sensor or the lens.
+      // Differences use only neighbours that have a ray, inside the border of sensor and lens.
       const int left = has_ray(x - 1, y) ? x - 1 : x;
       const int right = has_ray(x + 1, y) ? x + 1 : x;
       const int up = has_ray(x, y - 1) ? y - 1 : y;
@@ -182,8 +182,8 @@ namespace {
 
 constexpr int kSamples = 16;
 
-/// Hammersley's points. No two have the same row or column: an edge of any orientation covers a
-/// pixel in steps of 1/16.
+/// Returns Hammersley's points. No two points have the same row or column, so an edge of any
+/// orientation covers a pixel in steps of 1/16.
 std::array<Eigen::Vector2d, kSamples> makeSampleOffsets() {
   std::array<Eigen::Vector2d, kSamples> offsets;
   for (int i = 0; i < kSamples; ++i) {

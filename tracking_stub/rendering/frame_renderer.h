@@ -21,7 +21,7 @@ struct RayBounds {
   Eigen::Vector2d max = {1, 1};
 };
 
-/// The surface that a camera ray hits, and its inverse z-depth (1/m). -1 and 0 where there is none.
+/// The surface that a camera ray hits, and its inverse z-depth (1/m). -1 and 0 if there is none.
 struct ViewHit {
   int surface = -1;
   double inverse_depth = 0;
@@ -30,27 +30,27 @@ struct ViewHit {
 /// A scene seen from one pose, for casting the rays of all pixels.
 ///
 /// On a plane, the inverse depth and the plane's coordinates over depth are linear in the ray
-/// (X/Z, Y/Z). So a rectangle is three linear functions, and a hit needs no division. The bounds
-/// are divided into tiles. A tile lists the surfaces that are visible in it, nearest first. Rays
-/// outside of the bounds are slower. Queries are thread-safe.
+/// (X/Z, Y/Z). So a rectangle is represented by three linear functions, and finding a hit needs no
+/// division. The bounds are divided into tiles. A tile lists its visible surfaces, nearest first.
+/// Rays outside of the bounds are slower. Queries are thread-safe.
 class SceneView {
  public:
-  /// @param scene outlives the view.
+  /// @param scene must outlive the view.
   SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBounds& bounds = {});
 
-  /// The first surface on the ray (X/Z, Y/Z). A ray that is not a number hits none.
+  /// Returns the first surface on the ray (X/Z, Y/Z). A ray of NaN hits no surface.
   ViewHit cast(const Eigen::Vector2d& ray) const;
 
-  /// The surface point of a hit of this ray.
+  /// Returns the surface point of this ray's hit.
   SurfacePoint surfacePointOf(const ViewHit& hit, const Eigen::Vector2d& ray) const;
 
-  /// Log intensity of a hit of this ray, blurred with a standard deviation of half a pixel. 0 where
-  /// the ray hits nothing.
+  /// Returns the log intensity of this ray's hit, blurred with a standard deviation of half a
+  /// pixel. It is 0 if the ray hits nothing.
   /// @param pixel_pitch size of a pixel in units of the ray: about 1/f.
   float logIntensity(const ViewHit& hit, const Eigen::Vector2d& ray, double pixel_pitch) const;
 
  private:
-  // Coefficients of X/Z, Y/Z and 1.
+  // The vectors are coefficients of X/Z, Y/Z and 1.
   struct Facet {
     int surface;
     Eigen::Vector3d inverse_depth;
@@ -73,20 +73,20 @@ class SceneView {
   const Scene* scene_;
   RayBounds bounds_;
   Eigen::Vector2d tiles_per_ray_;
-  std::vector<Facet> facets_;                  // the visible sides only
-  std::vector<int> facet_of_;                  // per surface; -1
+  std::vector<Facet> facets_;                  // only the visible sides
+  std::vector<int> facet_of_;                  // index per surface; -1 if not visible
   std::vector<std::vector<Candidate>> tiles_;  // row-major; the last is for rays out of the bounds
 };
 
-/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel. Not numbers
-/// where the pixel lies outside the lens: it is dark.
+/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel. The ray is
+/// NaN if the pixel lies outside the lens: such a pixel is dark.
 struct PixelRay {
   Eigen::Vector2d ray = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-  Eigen::Vector2d per_x = ray;  ///< Per pixel to the right.
-  Eigen::Vector2d per_y = ray;  ///< Per pixel down.
+  Eigen::Vector2d per_x = ray;  ///< Change of the ray per pixel to the right.
+  Eigen::Vector2d per_y = ray;  ///< Change of the ray per pixel down.
   double pitch = 0;             ///< Size of the pixel in units of the ray.
 
-  /// The ray of a point in the pixel. The offsets from the centre are -0.5 to 0.5.
+  /// Returns the ray of a point in the pixel. The offsets from the centre are -0.5 to 0.5 pixels.
   Eigen::Vector2d at(double dx, double dy) const { return ray + dx * per_x + dy * per_y; }
 };
 
@@ -101,7 +101,7 @@ class PixelRays {
     return rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
                  static_cast<std::size_t>(x)];
   }
-  /// Bounds of all rays of all pixels.
+  /// Returns the bounds of all rays of all pixels.
   const RayBounds& bounds() const { return bounds_; }
 
  private:
@@ -114,28 +114,28 @@ class PixelRays {
 /// The image of a camera at one time.
 struct Frame {
   cv::Mat1f log_intensity;
-  cv::Mat1i surface;  ///< Index at the pixel's centre; -1 where there is none.
+  cv::Mat1i surface;  ///< Index of the surface at the pixel's centre; -1 if there is none.
 };
 
-/// Renders a scene through a camera without aliasing. Within a surface the texture is blurred. At a
-/// silhouette, where an adjacent pixel has another surface, a pixel averages over its area.
+/// Renders a scene through a camera without aliasing. Within a surface the texture is blurred. A
+/// pixel at a silhouette (an adjacent pixel has another surface) is the average over its area.
 class FrameRenderer {
  public:
   explicit FrameRenderer(const CameraModel& model) : rays_(model) {}
 
   const PixelRays& rays() const { return rays_; }
 
-  /// The view for `render` and `sourceOf`.
+  /// Returns the view for `render` and `sourceOf`.
   SceneView viewFrom(const Scene& scene, const Rigid3& T_world_cam) const {
     return SceneView(scene, T_world_cam, rays_.bounds());
   }
 
-  /// Uses the threads of the caller's oneTBB arena. The result does not depend on them.
-  /// @param frame reused where it has the right size.
+  /// Renders a frame in the caller's oneTBB arena. The result does not depend on its threads.
+  /// @param frame its memory is reused if it has the right size.
   void render(const SceneView& view, Frame& frame) const;
 
-  /// The surface point that causes a change of brightness at a pixel: the point at its centre. On a
-  /// silhouette it is the nearest point within the pixel, because the edge is on the front surface.
+  /// Returns the surface point that causes a change of brightness at a pixel: its centre's point.
+  /// On a silhouette it is the nearest point within the pixel: the front surface has the edge.
   SurfacePoint sourceOf(const SceneView& view, const Frame& frame, int x, int y) const;
 
  private:
@@ -145,8 +145,8 @@ class FrameRenderer {
   PixelRays rays_;
 };
 
-/// The exact depth map of a scene: z-depth in metres on the ray through each pixel's centre. 0
-/// where the ray hits nothing.
+/// Returns the exact depth map of a scene: z-depth in metres on the ray through each pixel's
+/// centre, 0 if the ray hits nothing.
 cv::Mat1f renderDepth(const Scene& scene, const Rigid3& T_world_cam, const ReferenceView& view);
 
 }  // namespace efm

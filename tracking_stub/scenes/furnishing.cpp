@@ -39,8 +39,8 @@ Scene::Painter Painting::rings(double nearest_m, double band_m, float tone, floa
 
 namespace {
 
-/// The canvas is finer than the texels by this factor. The average over a texel tells the position
-/// of an edge within it.
+/// The canvas is finer than the texels by this factor. The average over a texel represents the
+/// position of an edge within the texel.
 constexpr int kOversampling = 4;
 
 using Polygon = std::vector<cv::Point2d>;
@@ -67,7 +67,7 @@ Polygon convexPolygon(int corners, double radius, RandomNumbers& random) {
   return polygon;
 }
 
-/// A shape around the origin: one polygon or three parallel bars.
+/// Returns a shape around the origin: one polygon or three parallel bars.
 std::vector<Polygon> drawShape(double size, RandomNumbers& random) {
   const double angle = random.uniform(0, kPi);
   switch (random.below(4)) {
@@ -106,7 +106,7 @@ Scene::Painter Painting::clutter(double nearest_m, double feature_m, double cont
     const int columns = texelsAlong(width_m, texel_m);
     const int rows = texelsAlong(height_m, texel_m);
     const double px_per_m = kOversampling / texel_m;
-    const double ground = random.uniform(-0.6, 0.6);  // surfaces differ: silhouettes are visible
+    const double ground = random.uniform(-0.6, 0.6);  // surfaces differ, so silhouettes are visible
     cv::Mat1f canvas(rows * kOversampling, columns * kOversampling);
     std::fill(canvas.begin(), canvas.end(), static_cast<float>(ground));
     const double area = width_m * height_m;
@@ -131,7 +131,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The pose of an upright object on the ground. Its origin is in its middle.
+/// Returns the pose of an upright object on the ground. The object's origin is in its middle.
 Rigid3 standingPose(const Vector3d& foot, double height_m, double yaw_deg = 0) {
   Rigid3 T_ground_object;
   T_ground_object.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());

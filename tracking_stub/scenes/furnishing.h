@@ -13,14 +13,14 @@ namespace efm {
 struct PaintingOptions {
   std::uint64_t seed = 0;
   double focal_px = 226;   ///< Longest focal length of the cameras: a pixel covers depth / focal.
-  double coverage = 0.28;  ///< Of clutter: shapes per feature x feature.
-  /// Min size of a texel, metres. It limits the memory of large surfaces. Edges are softer where
+  double coverage = 0.28;  ///< Number of clutter's shapes per feature x feature.
+  /// Minimum size of a texel, metres. It limits the memory of large surfaces. Edges are softer if
   /// the distance is below 2 x texel x focal.
   double min_texel_m = 0;
 };
 
-/// Paints the surfaces of a scene, each with its own seed: the n-th surface depends on n and the
-/// seed only. The painters that it returns must not outlive it.
+/// Paints the surfaces of a scene, each with its own seed: the n-th surface depends only on n and
+/// the seed. This object must outlive the painters that it returns.
 class Painting {
  public:
   explicit Painting(const PaintingOptions& options)
@@ -28,15 +28,15 @@ class Painting {
 
   /// Paints clutter: sharp blocks, triangles, polygons and bars of all orientations and many
   /// contrasts on an even ground. Most edges are farther apart than the blur of a pixel, so events
-  /// gather on them.
+  /// concentrate on edges.
   /// @param nearest_m the shortest distance to a camera. A texel is half a pixel at this distance:
   /// then the blur of the finest texture level is half a pixel.
   /// @param feature_m mean size of a shape, and mean distance of shapes.
-  /// @param contrast max difference in log intensity between a shape and the ground.
+  /// @param contrast maximum difference in log intensity between a shape and the ground.
   Scene::Painter clutter(double nearest_m, double feature_m, double contrast = 0.9);
 
   /// Paints rings around a pole, in two tones. All facets are equal.
-  /// @param tone log intensity of the first ring; the second is darker by `contrast`.
+  /// @param tone log intensity of the first ring; the second ring is darker by `contrast`.
   Scene::Painter rings(double nearest_m, double band_m, float tone, float contrast) const;
 
  private:
@@ -48,7 +48,7 @@ class Painting {
 
 /// Parts of rooms and streets. Frame `world`: z up.
 
-/// Adds a box on the ground, rotated about the vertical.
+/// Adds a box on the ground, rotated about the vertical by `yaw_deg`.
 void addStandingBox(Scene& scene, const Eigen::Vector3d& foot, const Eigen::Vector3d& size_m,
                     double yaw_deg, const Scene::Painter& paint);
 
@@ -56,17 +56,17 @@ void addStandingBox(Scene& scene, const Eigen::Vector3d& foot, const Eigen::Vect
 void addStandingPole(Scene& scene, const Eigen::Vector3d& foot, double radius_m, double length_m,
                      const Scene::Painter& paint);
 
-/// Adds a rectangle in equal panels with sides of at most `max_side_m`. Each panel has its own
-/// painting, which limits the memory of a painting.
+/// Adds a rectangle as equal panels with sides of at most `max_side_m`. Each panel has its own
+/// painting, which limits the memory per painting.
 void addPanels(Scene& scene, const Rectangle& rectangle, double max_side_m,
                const Scene::Painter& paint);
 
 /// A wall of a room with space for furniture before it: x along the wall, y into the room, z up.
 struct FurnishedWall {
-  Rigid3 T_world_wall;  ///< Origin: on the floor, at the left end of the wall, seen from inside.
+  Rigid3 T_world_wall;  ///< Origin: on the floor, at the wall's left end (seen from inside).
   double length_m = 5;
   double height_m = 2.6;
-  double depth_m = 0.6;  ///< Max depth of the furniture, at least 0.4.
+  double depth_m = 0.6;  ///< Maximum depth of the furniture, at least 0.4.
   double nearest_m = 1;  ///< The shortest distance of the furniture to a camera.
 };
 

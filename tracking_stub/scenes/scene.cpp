@@ -22,7 +22,7 @@ Texture::Texture(const cv::Mat1f& log_intensity, double texel_m) {
   levels_.push_back({image, static_cast<float>(1.0 / texel_m)});
   while (std::min(image.cols, image.rows) > 3) {
     // The next level's texel and blur are twice as wide: a variance of 4 in texels of this level.
-    // This level has 1 of it, and averaging 2x2 texels adds 1/4.
+    // This level already has a variance of 1, and averaging 2x2 texels adds 1/4: 2.75 are missing.
     cv::Mat1f blurred;
     cv::GaussianBlur(image, blurred, {}, std::sqrt(2.75), std::sqrt(2.75), cv::BORDER_REPLICATE);
     // An odd last row or column gets its own texel, so that texels stay aligned.
@@ -36,8 +36,8 @@ Texture::Texture(const cv::Mat1f& log_intensity, double texel_m) {
 }
 
 float Texture::sample(double u_m, double v_m, double sigma_m) const {
-  // Exponent and mantissa approximate log2 of the blur in texels: piecewise linear, continuous, and
-  // exact at the levels.
+  // Exponent and mantissa approximate log2 of the blur in texels. The approximation is piecewise
+  // linear, continuous, and exact at the levels.
   int exponent = 0;
   const double mantissa = std::frexp(sigma_m * levels_.front().texels_per_m, &exponent);
   const int fine = exponent - 1;
@@ -81,7 +81,7 @@ int Scene::addRectangle(const Rectangle& rectangle, const Painter& paint) {
 void Scene::addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, const Painter& paint) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const double side : {-1.0, 1.0}) {
-      // u x v points along +axis. The opposite face exchanges u and v.
+      // u x v points along +axis. For the opposite face, u and v are exchanged.
       int u = (axis + 1) % 3;
       int v = (axis + 2) % 3;
       if (side < 0) std::swap(u, v);
@@ -97,7 +97,7 @@ void Scene::addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, con
 void Scene::addPole(const Pole& pole, const Painter& paint) {
   requireOption(pole.radius_m > 0, "radius_m", pole.radius_m, "above 0");
   requireOption(pole.length_m > 0, "length_m", pole.length_m, "above 0");
-  constexpr int kFacets = 8;  // even: see the ends
+  constexpr int kFacets = 8;  // even, because an end joins opposite facets
   const double half_angle = kPi / kFacets;
   const double width = 2 * pole.radius_m * std::sin(half_angle);
   const double apothem = pole.radius_m * std::cos(half_angle);

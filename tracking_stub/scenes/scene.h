@@ -19,8 +19,8 @@ class Texture {
   /// @param log_intensity the painting; texel (i, j) covers [i, i+1) x [j, j+1) times `texel_m`.
   Texture(const cv::Mat1f& log_intensity, double texel_m);
 
-  /// Log intensity at (u, v) metres from the painting's corner, under a Gaussian blur of standard
-  /// deviation `sigma_m` (at least one texel). The border is repeated outside of the painting.
+  /// Returns log intensity at (u, v) metres from the painting's corner, with a Gaussian blur of
+  /// standard deviation `sigma_m` (at least one texel). Outside, the border is repeated.
   float sample(double u_m, double v_m, double sigma_m) const;
 
  private:
@@ -34,7 +34,7 @@ class Texture {
 };
 
 /// A flat rectangle: the points corner + u axis_u + v axis_v, 0 <= u <= width, 0 <= v <= height,
-/// frame `world`, metres. Visible only from the side of its normal, axis_u x axis_v.
+/// frame `world`, metres. It is visible only from the side of its normal, axis_u x axis_v.
 ///
 /// Invariant: the axes are orthogonal and of unit length.
 struct Rectangle {
@@ -52,7 +52,7 @@ struct Rectangle {
 
 /// A point on a surface of a scene.
 struct SurfacePoint {
-  int surface = -1;  ///< Index; -1 where a ray hits nothing.
+  int surface = -1;  ///< Index of the surface; -1 if a ray hits nothing.
   float u_m = 0;
   float v_m = 0;
 };
@@ -60,7 +60,7 @@ struct SurfacePoint {
 /// A prism with eight sides: a thin pole, a lamp post or the leg of a table.
 struct Pole {
   Rigid3 T_world_pole;     ///< Frame `pole`: origin in the middle, z along the pole.
-  double radius_m = 0.02;  ///< Distance of the corners from the axis, above 0.
+  double radius_m = 0.02;  ///< Distance between the corners and the axis, above 0.
   double length_m = 1;
 };
 
@@ -70,16 +70,16 @@ class Scene {
   /// Makes the texture of a surface.
   using Painter = std::function<Texture(double width_m, double height_m)>;
 
-  /// @return the index of the surface.
+  /// Adds a surface. @return the index of the surface.
   int addRectangle(const Rectangle& rectangle, const Painter& paint);
   /// Adds six rectangles, visible from outside. The origin of frame `box` is the centre of the box.
   void addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, const Painter& paint);
 
   /// Adds a rectangle per facet, with u around the pole and v along it. Each end is the union of
-  /// rectangles between opposite facets. They overlap, so `paint` must paint them all equally.
+  /// rectangles between opposite facets. They overlap, so `paint` must paint all of them equally.
   void addPole(const Pole& pole, const Painter& paint);
 
-  /// Moves all surfaces: a point at p goes to T_world_old * p.
+  /// Moves all surfaces: a point p moves to T_world_old * p.
   void move(const Rigid3& T_world_old);
 
   int size() const { return static_cast<int>(rectangles_.size()); }

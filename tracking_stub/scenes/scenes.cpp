@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 constexpr double kRoomPanelM = 1.7;
 
-/// One of the four walls. Its origin is at the left end, seen from inside.
+/// Returns one of the four walls. The wall's origin is at its left end, seen from inside.
 FurnishedWall wallOf(const RoomOptions& options, int side) {
   const bool along_x = side % 2 == 0;
   const double length = along_x ? options.size_m.x() : options.size_m.y();
@@ -48,13 +48,13 @@ void addFloorAndCeiling(Scene& scene, const RoomOptions& options, Painting& pain
 }
 
 constexpr double kBehindM = 6;  // from the start of the street to the path
-constexpr double kAheadM = 25;  // from the path to the house at the end, at least
+constexpr double kAheadM = 25;  // minimum from the path to the house at the end
 constexpr double kStreetPanelM = 5;
 constexpr double kClearanceM = 3;  // from the path to the nearest object
 constexpr double kFacadeM = 7;     // from the middle of the road to the houses
 constexpr double kNearestM = 4;
 
-/// The path with straight extensions at both ends. Positions are lengths along it.
+/// The path with straight extensions at both ends. A position on the line is the length up to it.
 class MiddleLine {
  public:
   explicit MiddleLine(const StreetOptions& options) {
@@ -84,7 +84,7 @@ class MiddleLine {
 
   struct Station {
     Vector2d point;
-    Vector2d ahead;  // of unit length
+    Vector2d ahead;  // unit vector
     Vector2d leftBy(double left_m) const {
       return point + left_m * Vector2d(-ahead.y(), ahead.x());
     }
@@ -101,7 +101,7 @@ class MiddleLine {
     return {points_.front(), Vector2d::UnitX()};
   }
 
-  /// The distance to the path without its extensions.
+  /// Returns the distance to the path without its extensions.
   double distanceToPath(const Vector2d& point) const {
     double nearest = (point - path_points_.front()).norm();
     for (const Vector2d& path_point : path_points_) {
@@ -156,7 +156,7 @@ class StreetBuilder {
     return line_.distanceToPath(middle) > radius_m + kClearanceM;
   }
 
-  /// Three sides without a roof: the others are never visible.
+  /// Adds three sides of a house: the roof and the other side are never visible.
   void addHouse(const MiddleLine::Station& station, double left_m, const Vector3d& size_m) {
     const double side = left_m == 0 ? 0 : (left_m > 0 ? 1 : -1);
     const Vector2d across(-station.ahead.y(), station.ahead.x());
@@ -260,7 +260,7 @@ Scene makeRoom(const RoomOptions& options) {
   for (int side = 0; side < 4; ++side) {
     const FurnishedWall wall = wallOf(options, side);
     const Eigen::Quaterniond& R_world_wall = wall.T_world_wall.rotation;
-    // The normal z x x is the wall's y: into the room.
+    // The normal, z x x, is the wall's y axis, which points into the room.
     addPanels(scene,
               {wall.T_world_wall.translation, R_world_wall * Vector3d::UnitZ(),
                R_world_wall * Vector3d::UnitX(), wall.height_m, wall.length_m},
@@ -288,8 +288,8 @@ Scene makePoles(const PolesOptions& options) {
              2 * half_wall},
             1.5, painting.clutter(options.wall_m - 0.3, 0.1 * options.wall_m));
   for (int i = 0; i < options.poles; ++i) {
-    // Even in inverse depth. Neighbours in depth are far apart to the side, so that no pole hides
-    // another.
+    // Depths are even in inverse depth. Poles of similar depth are far apart sideways, so that no
+    // pole hides another pole.
     const double fraction = (i + random.uniform(0.2, 0.8)) / options.poles;
     const double depth = 1 / ((1 - fraction) / options.nearest_m + fraction / options.farthest_m);
     const double side = (i * 5 % options.poles + random.uniform(0.2, 0.8)) / options.poles;

@@ -22,7 +22,7 @@ namespace {
 bool isRate(double hz) { return hz >= 0 && hz <= EventNoiseOptions::kMaxHz; }
 
 std::int64_t roundToMicroseconds(std::int64_t base_ns, double offset_ns) {
-  // Only the part below a microsecond is a double.
+  // Only the part below a microsecond is computed as a double, which keeps long times exact.
   constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
   const std::int64_t whole = base_ns / kNanosecondsPerMicrosecond;
   const auto rest_ns = static_cast<double>(base_ns - whole * kNanosecondsPerMicrosecond);
@@ -67,7 +67,7 @@ void EventNoise::fireRow(int y, std::int64_t until_ns, std::vector<Event>& event
   for (std::size_t x = 0; x < width_; ++x) {
     Pixel& pixel = row[x];
     while (true) {
-      // Rounded up to whole microseconds, as sensors stamp events.
+      // Rounded up to whole microseconds, the stamps of sensors.
       constexpr std::int64_t kTickNs = 1000;
       const std::int64_t whole = pixel.next_ns / kTickNs;
       const std::int64_t t_ns = (whole + (whole * kTickNs < pixel.next_ns ? 1 : 0)) * kTickNs;
@@ -116,7 +116,7 @@ void EventPixels::start(const cv::Mat1f& log_intensity, std::uint64_t seed) {
   for (int y = 0; y < last_.rows; ++y) {
     for (int x = 0; x < last_.cols; ++x) {
       const auto offset = static_cast<float>(random.uniform(-1, 1));
-      // A memory below the current intensity is within the threshold of an on event.
+      // If the memory is below the current intensity, the threshold of ON events limits the offset.
       last_(y, x) += thresholdAt(y, x, offset < 0) * offset;
     }
   }
@@ -134,7 +134,7 @@ void EventPixels::fireRow(int y, const FrameStep& step, const cv::Mat1f& before,
   for (int x = 0; x < last_.cols; ++x) {
     const double change = static_cast<double>(to[x]) - from[x];
     double earliest = 0;  // the pixel sees from this fraction of the step
-    // Whether the pixel sees within this step. After a blind time its memory is the current
+    // Returns whether the pixel sees within this step. After a blind time its memory is the current
     // intensity.
     const auto sees = [&] {
       if (blind_until == nullptr || blind_until[x] <= step.t0_ns) return true;
@@ -152,9 +152,9 @@ void EventPixels::fireRow(int y, const FrameStep& step, const cv::Mat1f& before,
       const float threshold = thresholdAt(y, x, brighter);
       if (!(std::abs(to[x] - last[x]) >= threshold)) break;
       last[x] += brighter ? threshold : -threshold;
-      // A pixel whose memory starts a threshold away fires at once, also without a change.
+      // A pixel whose memory starts a threshold away fires immediately, also without a change.
       const double fraction = change == 0 ? 0.0 : (static_cast<double>(last[x]) - from[x]) / change;
-      // By rounding, such a pixel may cross the threshold slightly outside of the step.
+      // Due to rounding, such a pixel may cross the threshold slightly outside of the step.
       const double offset_ns = std::clamp(fraction, earliest, 1.0) * duration_ns;
       const std::int64_t t_ns = roundToMicroseconds(step.t0_ns, offset_ns);
       events.push_back(
@@ -173,7 +173,7 @@ namespace {
 
 /// The frame rate is set for each interval of this length.
 constexpr std::int64_t kIntervalNs = 10'000'000;
-/// Pixels between the rays that measure the speed of the image.
+/// Distance in pixels between the rays that measure the speed of the image.
 constexpr int kSpeedGridPx = 12;
 
 struct AttributedEvent {
@@ -236,7 +236,7 @@ class CameraRun {
     return simulation_.motion->poseAt(t_ns) * camera_.T_rig_cam;
   }
 
-  /// The max speed in the undistorted image, pixels per second.
+  /// Returns the maximum speed in the undistorted image, pixels per second.
   double imageSpeed(std::int64_t t_ns) const {
     constexpr std::int64_t kStepNs = 500'000;
     const Rigid3 T_world_cam = poseAt(t_ns);

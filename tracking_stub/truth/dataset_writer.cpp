@@ -27,7 +27,7 @@ int cellsAlong(double length_m, double cell_m) {
   return std::max(1, static_cast<int>(std::lround(length_m / cell_m)));
 }
 
-/// The last cell contains its far border.
+/// Returns the cell of a position. The last cell contains its far border.
 int cellOf(double position_m, double length_m, int cells) {
   return std::clamp(static_cast<int>(position_m / length_m * cells), 0, cells - 1);
 }
@@ -62,7 +62,7 @@ void appendNumber(std::string& text, Number number) {
   text.append(digits, result.ptr);
 }
 
-/// Like formatSeconds, but fast enough for each event.
+/// Appends seconds like formatSeconds, but fast enough for each event.
 void appendSeconds(std::string& text, std::int64_t t_ns) {
   if (t_ns < 0) {
     text += formatSeconds(t_ns);
@@ -87,7 +87,7 @@ void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
 }
 
 constexpr std::uint32_t kMinEvents = 3;
-/// The rays of one view miss some cells. The views of the moving camera together see them.
+/// Time between two views. Rays of one view miss some cells; all views together hit these cells.
 constexpr std::int64_t kViewPeriodNs = 20'000'000;
 
 void addVisibleCells(const Scene& scene, const PixelRays& rays, const Rigid3& T_world_cam,
@@ -102,8 +102,8 @@ void addVisibleCells(const Scene& scene, const PixelRays& rays, const Rigid3& T_
 }
 
 /// Writes the truth for maps: a point per cell of about `Simulation::truth_cell_m` on the true
-/// surfaces, frame `world`. gt_cloud.ply has all cells that a pixel saw; gt_edges.ply those with at
-/// least 3 events, which a semi-dense map should contain.
+/// surfaces, frame `world`. gt_cloud.ply has all cells that a pixel saw; gt_edges.ply has the cells
+/// with at least 3 events, which a semi-dense map should contain.
 void writeTruthClouds(const fs::path& folder, const Simulation& simulation,
                       const std::vector<CameraRecording>& recordings) {
   SurfaceCells seen(simulation.scene, simulation.truth_cell_m);

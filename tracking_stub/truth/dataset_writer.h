@@ -19,14 +19,14 @@ namespace efm {
 /// Counters on a fine grid over every surface of a scene.
 class SurfaceCells {
  public:
-  /// @param scene outlives the cells.
-  /// @param cell_m side of a cell. Each surface rounds it to a divisor of its sides.
+  /// @param scene must outlive this object.
+  /// @param cell_m side of a cell. It is rounded to a divisor of each surface's sides.
   SurfaceCells(const Scene& scene, double cell_m);
 
   /// Adds one to the cell of a point. A point without a surface is ignored.
   void add(const SurfacePoint& point);
 
-  /// Centres of the cells with at least this count, frame `world`.
+  /// Returns the centres of the cells with at least this count, frame `world`.
   std::vector<Eigen::Vector3f> centers(std::uint32_t min_count) const;
 
  private:
@@ -48,11 +48,11 @@ class SurfaceCells {
 ///                          every 50 ms from the recording's start
 ///   depth/index.txt        a line `t file` per depth map, relative to depth/
 ///   gt_cloud.ply, gt_edges.ply   the truth clouds, frame `world`
-/// @param folder that exists, without files of these names.
-/// @param recordings of the simulation, one per camera.
+/// @param folder existing folder without files of these names.
+/// @param recordings recordings of the simulation, one per camera.
 /// @param before_file called before each file; it may throw.
-/// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
-/// the path where something cannot be written.
+/// @throws std::invalid_argument if camera 0 is not the rig's frame; std::runtime_error naming the
+/// path if a file cannot be written.
 void writeDataset(
     const std::filesystem::path& folder, const Simulation& simulation,
     const std::vector<CameraRecording>& recordings,
@@ -60,10 +60,10 @@ void writeDataset(
 
 /// Writes a line `t x y p` per event: seconds with nine decimals, polarity 0 or 1.
 void writeEvents(const std::filesystem::path& file, const std::vector<Event>& events);
-/// Appends these lines to a text.
+/// Appends the lines that `writeEvents` writes to a text.
 void appendEvents(std::string& text, EventSpan events);
 
-/// The rig as a Kalibr camera chain.
+/// Returns the rig as a Kalibr camera chain.
 std::string formatCamchain(const Rig& rig);
 
 /// Writes a binary little-endian PLY file with float vertices x y z.
