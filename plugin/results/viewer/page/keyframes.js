@@ -7,17 +7,21 @@ const frustumDepth = Math.min(Math.max(1.2 * step, 0.03 * radius), 0.07 * radius
 const frustumStride = Math.max(1, step > 0 ? Math.round(0.4 * frustumDepth / step) : 1,
                                Math.ceil(keyframes.length / 400));
 
-/// Endpoints of the lines from the camera to the corners of the image at `frustumDepth`, and around
-/// the image.
-function frustumLines(number) {
-  if (!map.view) return [];
+/// The corners of the image at `frustumDepth`, and the camera's centre.
+function frustumOf(number) {
   const {p, q} = keyframes[number], v = map.view;
   const at = (x, y) => add(p, rotate(q, [(x - v.cx) / v.fx * frustumDepth,
                                          (y - v.cy) / v.fy * frustumDepth, frustumDepth]));
-  const corners = [at(0, 0), at(v.width, 0), at(v.width, v.height), at(0, v.height)];
+  return {p, corners: [at(0, 0), at(v.width, 0), at(v.width, v.height), at(0, v.height)]};
+}
+/// Endpoints of its lines.
+function frustumLines(number) {
+  if (!map.view) return [];
+  const {p, corners} = frustumOf(number);
   return corners.flatMap((corner, i) => [p, corner, corner, corners[(i + 1) % 4]]);
 }
 const lastShown = () => Math.min(shown.time, keyframes.length - 1);
+const hasFrustum = number => number % frustumStride === 0;
 
 let lineCache = {};
 function linesNow() {
@@ -29,7 +33,7 @@ function linesNow() {
   const path = [], frusta = [];
   for (let i = 0; i <= lastShown(); ++i) {
     if (shown.path && i > 0) path.push(keyframes[i - 1].p, keyframes[i].p);
-    if (shown.frusta && i % frustumStride === 0 && i !== shown.selected) frusta.push(...frustumLines(i));
+    if (shown.frusta && hasFrustum(i) && i !== shown.selected) frusta.push(...frustumLines(i));
   }
   const selected = shown.selected < 0 ? [] : frustumLines(shown.selected);
   const lines = {path: lineBuffer(path), frusta: lineBuffer(frusta),
