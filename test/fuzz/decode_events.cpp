@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Decodes any bytes as the events of a rawlog's observation. The first two bytes say how many
-// events the observation claims. What is decoded is the same after encoding it again.
+// events the observation claims. Decoded events are the same after they are encoded again.
 
 #include <cstddef>
 #include <cstdint>

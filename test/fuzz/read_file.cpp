@@ -3,7 +3,7 @@
 //   EFM_FUZZ_HEADER      the header with the function that opens it
 //   EFM_FUZZ_OPEN        that function: openAedat4
 //   EFM_FUZZ_FIRST_LINE  optional: a line before the bytes
-// A file may be read or refused. An error names the file.
+// A file may be read or rejected. An error names the file.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -19,7 +19,7 @@ const std::string kBegin = EFM_FUZZ_FIRST_LINE "\n";
 const std::string kBegin;
 #endif
 
-/// @return the time in the middle of the first stream.
+/// @return the time of the middle event of the first stream.
 std::int64_t readStreams(const std::string& path, const std::int64_t* seek_ns) {
   efm::RecordingParts parts = efm::EFM_FUZZ_OPEN({path}, {});
   std::int64_t middle_ns = 0;

@@ -35,7 +35,7 @@ class Messages : public efm::BagSource {
     for (std::size_t at = 1; at + 2 <= size;) {
       const std::size_t length = data[at] + data[at + 1] * std::size_t{256};
       at += 2;
-      // A copy of its own, so that no byte behind a message can be read.
+      // A separate copy, so that no byte after a message can be read.
       messages_.emplace_back(data + at, data + at + std::min(length, size - at));
       at += std::min(length, size - at);
     }
@@ -67,7 +67,7 @@ void decodeAll(Messages& bag, efm::RosType type) {
   const auto cursor = bag.messages(0, 0);
   efm::BagMessage message;
   while (cursor(message)) {
-    // The caller of these knows the file's name.
+    // The caller of the decoders knows the file's name.
     efm::fuzz::readOrRefuse("", [&] {
       if (efm::hasPoses(type)) {
         efm::decodePose(message, type);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reads any bytes as a NumPy array or an archive of arrays: its numbers, from its beginning and
-// after a seek, its poses and its events.
+// Reads any bytes as a NumPy array or an archive of arrays. Reads numbers, poses and events, from
+// the beginning and after a seek.
 
 #include <algorithm>
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace {
 
-/// Numbers of some rows in each block.
+/// Reads some rows of each block as numbers and as times.
 void readNumbers(const std::shared_ptr<efm::NpyArray>& array, std::uint64_t first) {
   constexpr std::uint64_t kMaxRows = 100'000;
   for (std::uint64_t row = first; row < std::min(array->size(), kMaxRows);) {

@@ -14,10 +14,10 @@
 
 #include "plugin/recordings/streams/recording_parts.h"
 
-/// What the harnesses share.
+/// Helpers of all fuzz harnesses.
 namespace efm::fuzz {
 
-/// A file in memory.
+/// A file that exists only in memory.
 class MemoryFile {
  public:
   MemoryFile(const std::string& begin, const std::uint8_t* data, std::size_t size)
@@ -36,8 +36,8 @@ class MemoryFile {
   int file_;
 };
 
-/// Reads a stream, at most so many events that no input takes long.
-/// @return the time in the middle of its first events.
+/// Reads at most 4 million events of a stream, so that no input takes long.
+/// @return the time of the middle event of the first block that is not empty; 0 without events.
 inline std::int64_t readStream(EventStream& stream) {
   constexpr std::size_t kMaxEvents = 4'000'000;
   std::int64_t middle_ns = 0;
@@ -47,13 +47,13 @@ inline std::int64_t readStream(EventStream& stream) {
       middle_ns = events[events.size() / 2].t_ns;
       if (stream.positionOf(events.size() - 1).empty()) std::abort();
     }
-    // A block without events costs time, too.
+    // A block without events also takes time.
     count += events.size() + 1;
   }
   return middle_ns;
 }
 
-/// Calls `read`, which may refuse a file with an error that names it.
+/// Calls `read`. It may reject a file with an error that names the file.
 template <typename Read>
 void readOrRefuse(const std::string& file, const Read& read) {
   try {

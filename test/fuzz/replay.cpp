@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Without libFuzzer: reads the files of a folder and damaged copies of them, the same in each run.
+// Replaces libFuzzer: reads the files of a folder and damaged copies, the same in each run.
 //   PROGRAM FOLDER [SECONDS]
 #include <algorithm>
 #include <chrono>
@@ -24,13 +24,13 @@ void damage(Bytes& bytes, std::mt19937& random) {
   for (unsigned changes = 1 + random() % 4; changes > 0 && !bytes.empty(); --changes) {
     const auto at = static_cast<std::ptrdiff_t>(random() % bytes.size());
     switch (random() % 5) {
-      case 0:  // cut
+      case 0:  // cuts the end
         bytes.resize(static_cast<std::size_t>(at));
         break;
-      case 1:  // a wrong length, perhaps
+      case 1:  // may make a length wrong
         bytes[static_cast<std::size_t>(at)] = random() % 2 == 0 ? 0xff : 0;
         break;
-      case 2:  // a part is missing
+      case 2:  // removes a part
         bytes.erase(bytes.begin() + at,
                     bytes.begin() + std::min(at + 1 + static_cast<std::ptrdiff_t>(random() % 16),
                                              static_cast<std::ptrdiff_t>(bytes.size())));

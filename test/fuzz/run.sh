@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Builds the fuzzers with clang and runs each for a time. What they find is written to build/fuzz/findings.
-#   run.sh [SECONDS] [NAME ...]    default: 60 seconds each, all of them
+# Builds the fuzzers with clang and runs each for a time. Their findings are written to build/fuzz/findings.
+#   run.sh [SECONDS] [NAME ...]    default: 60 seconds each, all fuzzers
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 seconds=${1:-60}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Undoes the filters of any bytes as a chunk of an HDF5 data set. The first byte says which
-// filters, the second one the length of the numbers, two more the length of the result.
+// Undoes the filters of any bytes as a chunk of an HDF5 data set. The first byte selects the
+// filters, the second byte the length of the numbers, two more bytes the length of the result.
 
 #include <cstddef>
 #include <cstdint>

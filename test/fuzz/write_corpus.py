@@ -93,7 +93,7 @@ def write_bags(dataset, scratch, corpus):
     file = scratch / "bag"
     ros2.write_loose_mcap(file, messages)
     write(corpus, "mcap", "loose", file.read_bytes())
-    # Without checksums, damage reaches what is behind them.
+    # Without checksums, damage reaches the code after the checks.
     for name, compress in (("", bytes), ("lz4", ros2.lz4.frame.compress), ("zstd", zstd)):
         ros2.write_chunked_mcap(file, messages, name, compress, lambda _: 0)
         write(corpus, "mcap", name or "none", file.read_bytes())
