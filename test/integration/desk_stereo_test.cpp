@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The method end to end on the simulated desk, compared with the exact truth.
+// Tests the whole method on the simulated desk against the exact truth.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -22,7 +22,7 @@ FusionMapperOptions optionsOf(double window_s, double stride_s) {
   return options;
 }
 
-/// The share of bad pixels over all keyframes together.
+/// Returns the share of bad pixels of all keyframes together.
 double badShare(const FusionMapperOptions& options, const char* name) {
   const SimulatedRecording& desk = SimulatedRecording::desk();
   std::vector<DepthPair> all;
@@ -68,7 +68,7 @@ TEST(DeskStereo, DepthIsGoodToAFractionOfAPlaneAndTheMapLiesOnTheTrueSurfaces) {
 }
 
 TEST(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
-  // As the paper has it, whose claim is tested: no groups of events, its extraction.
+  // Tests the paper's claim with its settings: no groups of events, the paper's extraction.
   FusionMapperOptions harmonic = optionsOf(0.1, 0.1);
   harmonic.keyframe.split = SplitFusionOptions::none();
   harmonic.keyframe.extraction.extraction = ExtractionMethod::kPaper;

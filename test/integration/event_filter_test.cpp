@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Hot pixels of a stereo rig, end to end: the simulator says which events are noise.
+// Tests the event filter on hot pixels of a stereo rig. The simulator knows the noise events.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace efm {
 namespace {
 
-/// A tenth of a percent of the pixels fires a thousand times a second.
+/// Returns a rig. If `hot`, 0.1 % of the pixels fire a thousand times per second.
 Simulation makeRig(bool hot) {
   SimulationOptions options;
   options.preset = "desk_stereo";
@@ -29,10 +29,10 @@ Simulation makeRig(bool hot) {
 
 struct Mapped {
   std::size_t points = 0;
-  double bad_share = 0;  ///< Of the points, more than 10 % from the true depth.
+  double bad_share = 0;  ///< Share of the points that are more than 10 % from the true depth.
 };
 
-/// The last window, once the filter has seen a little.
+/// Maps only the last window, after the filter has seen 0.3 s of events.
 Mapped mapLast(const Simulation& simulation, const std::vector<CameraRecording>& recordings,
                bool hot_pixels) {
   FusionMapperOptions options;
@@ -50,7 +50,7 @@ Mapped mapLast(const Simulation& simulation, const std::vector<CameraRecording>&
   return {pairs.size(), static_cast<double>(bad) / static_cast<double>(pairs.size())};
 }
 
-/// Events of hot pixels and of edges, and those of each that the filter leaves out.
+/// Numbers of events of hot pixels and of edges, and of the events that the filter removes.
 struct Filtered {
   double noise = 0, noise_left_out = 0, edges = 0, edges_left_out = 0;
 
@@ -85,7 +85,7 @@ TEST(EventFilterEndToEnd, HotPixelsAreTakenOutAndEdgesAreNot) {
   EXPECT_LT(filtered.bad_share, 1.15 * ideal.bad_share);
   EXPECT_GT(filtered.points, ideal.points * 9 / 10);
 
-  // Which ones: all but the first 50 of each hot pixel, and of the edges those that they fire.
+  // Removed: all but the first 50 events of each hot pixel, including its events of edges.
   const Filtered of_hot(hot, hot_events);
   EXPECT_GT(of_hot.noise_left_out, 0.85 * of_hot.noise);
   EXPECT_LT(of_hot.edges_left_out, 0.002 * of_hot.edges);

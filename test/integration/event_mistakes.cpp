@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Mistakes about the events, their units and their columns, the calibration and the command line.
+// Mistakes in the events, their units and their columns, the calibration and the command line.
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using Draft = DraftRecording;
 
-/// Changes each event of a camera.
+/// Returns a change of each event of a camera.
 template <typename Change>
 std::function<void(Draft&)> eachEvent(std::size_t camera, Change change) {
   return [camera, change](Draft& draft) {
@@ -24,7 +24,7 @@ std::function<void(Draft&)> eachEvent(std::size_t camera, Change change) {
   };
 }
 
-/// Writes the events with other lines.
+/// Returns a change that writes the events with other lines.
 std::function<void(Draft&)> lines(Draft::EventLine line) {
   return [line](Draft& draft) { draft.event_line = line; };
 }
@@ -47,7 +47,7 @@ void timeLast(const Event& event, std::string& text) {
                  event.polarity ? 1 : 0, formatSeconds(event.t_ns));
 }
 
-/// Without this many columns at the left, and 106 in all.
+/// Crops the pictures to 240 of 346 columns. `left` columns are removed at the left.
 std::function<void(Draft&)> cropped(int left) {
   return [left](Draft& draft) {
     for (std::vector<Event>& events : draft.events) {
@@ -144,7 +144,7 @@ std::vector<Mistake> eventMistakes() {
         "259 of 0 to 259 alone: are its pictures cropped, or its pixels binned? The calibration "
         "must be of the pixels that the events have: the resolution, and cx and cy less by an "
         "offset that was cut off (--calibration",
-        // A wrong principal point is like a turn, which other times explain in part.
+        // A wrong principal point looks like a rotation; a time shift explains part of it.
         "warning: time-shift: the events are 3 % sharper with the poses ~0.044 s earlier"}},
       {"binned pixels",
        [](Draft& draft) {

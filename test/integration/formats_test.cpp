@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One recording in every format gives one depth map. Independent programs wrote the formats
+// Maps one recording in each format: the depth maps are equal. Independent programs wrote the files
 // (test/formats).
 
 #include <fmt/format.h>
@@ -28,15 +28,15 @@ const fs::path kFormats = EFM_RECORDINGS "/formats";
 /// A recording as a user names it.
 struct Recorded {
   std::string name;
-  std::string sources;  ///< Below `formats/`.
-  std::string lacks;    ///< What options must give: "calibration", "poses" or both.
+  std::string sources;  ///< Files below `formats/`.
+  std::string lacks;    ///< Parts that options must give: "calibration", "poses" or both.
 };
 
 void PrintTo(const Recorded& recorded, std::ostream* stream) { *stream << recorded.name; }
 
 class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
  protected:
-  /// The depth map and the confidence map of a window in the middle of the recording.
+  /// Returns depth map and confidence map of a window in the middle of the recording.
   std::string mapsOf(const std::string& recording) const {
     const Result result = run("depth " EFM_SOURCE_DIR "/config/simulated_stereo.ini " + recording +
                               " --t0 1.45 --t1 1.6 --out out");
@@ -61,7 +61,7 @@ class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
     return source;
   }
 
-  /// The same on the command line.
+  /// Returns `source()` as arguments of the command line.
   static std::string arguments() {
     const RecordingSource recording = source();
     std::string arguments;
@@ -77,7 +77,7 @@ TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
   EXPECT_TRUE(mapsOf(arguments()) == mapsOfFolder());
 }
 
-/// The options are chosen from the interval alone.
+/// The options are chosen from the data of the interval only.
 TEST_P(Formats, TheMapOfAnIntervalIsThatOfARecordingCutThere) {
   const auto map_of = [&](const std::string& recording) {
     const Result result = run("map " + recording + " --out out");
@@ -97,7 +97,7 @@ TEST_P(Formats, TheMapOfAnIntervalIsThatOfARecordingCutThere) {
   EXPECT_TRUE(map_of("whole.rawlog" + interval) == map);
 }
 
-/// The events of each camera.
+/// Returns the events of each camera.
 std::map<int, std::vector<Event>> eventsOf(const RecordingSource& source) {
   std::map<int, std::vector<Event>> events;
   const std::unique_ptr<Recording> recording = openRecording(source);
@@ -117,7 +117,7 @@ TEST_P(Formats, APartIsWhatTheWholeHasThere) {
   std::mt19937 random(1);
   for (int trial = 0; trial < 4; ++trial) {
     const std::vector<Event>& camera = whole.at(trial % static_cast<int>(whole.size()));
-    std::array<std::int64_t, 2> limits{};  // times of events: each limit is seen to be exact
+    std::array<std::int64_t, 2> limits{};  // times of events, so each limit must be exact
     for (std::int64_t& limit : limits) limit = camera[random() % camera.size()].t_ns;
     const auto [start_ns, end_ns] = std::minmax({limits[0], limits[1] + trial});
     part.limits = {start_ns, end_ns};
@@ -174,7 +174,7 @@ TEST_F(Formats, ExportedRecordingsGiveTheDepthMapOfTheTextFolder) {
   EXPECT_GT(reportIn("out")["points"], 2000) << "the maps show something";
   ASSERT_EQ(run("import " + folderRecording() + " --out r.rawlog --compression zstd").status, 0);
   EXPECT_TRUE(mapsOf("r.rawlog") == maps);
-  // MCAP has no message for the cameras' poses on the rig.
+  // MCAP has no message for the camera poses on the rig.
   const std::string calibration = " --calibration " + folderRecording() + "/camchain.yaml";
   for (const auto& [format, options] :
        {std::pair<std::string, std::string>{"folder", ""}, {"dsec", ""}, {"mcap", calibration}}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `map --record-frames` and `map --view`: the growing map is drawn without a screen, and in a
+// Tests that `map --record-frames` draws the growing map without a screen, and `map --view` in a
 // window.
 #include <gmock/gmock.h>
 
@@ -23,7 +23,7 @@ using testing::HasSubstr;
 
 class GrowingMap : public ProgramTest {
  protected:
-  /// The pixels of the cloud: the left part of a frame, where a colour is no grey.
+  /// Returns the number of coloured pixels in the left part of a frame, which shows the cloud.
   int cloudPixelsIn(const std::string& frame) const {
     const cv::Mat3b picture = cv::imread((folder() / frame).string());
     EXPECT_EQ(picture.size(), cv::Size(1280, 720)) << frame;
@@ -49,7 +49,7 @@ class GrowingMap : public ProgramTest {
     return readTumTrajectory(folder() / "out" / "trajectory.txt");
   }
 
-  /// The screen of Xvfb in its file: a header of big-endian words, then 4 bytes a pixel.
+  /// Reads the screen of Xvfb from its file: a header of big-endian words, then 4 bytes per pixel.
   static cv::Mat4b screenIn(std::string dump) {
     const auto word = [&](std::size_t index) {
       std::uint32_t value = 0;
@@ -89,7 +89,7 @@ TEST_F(GrowingMap, HasAFrameForEachKeyframeAndTheSameResult) {
   EXPECT_EQ(filesIn("new/frames").size(), 4U);
 }
 
-/// Dots of an F before the cameras, 0.6 m wide and 1.2 m high, upright as they see it.
+/// Returns dots of an F before the cameras, 0.6 m wide, 1.2 m high, upright in the cameras' view.
 SyntheticScene letterF() {
   SyntheticScene scene;
   std::mt19937 random(3);
@@ -120,19 +120,19 @@ TEST_F(GrowingMap, AnFStandsUprightInEveryPicture) {
 
   const cv::Mat3b map = picture("out/map.png");
   expectF(colours(map({map.cols / 2, 0, map.cols - map.cols / 2, map.rows * 9 / 10})));
-  const cv::Mat3b sheet = picture("out/overview.png");  // two by two keyframes and a bar
+  const cv::Mat3b sheet = picture("out/overview.png");  // two by two keyframes and a colour bar
   for (const cv::Point& cell : {cv::Point(0, 0), {1, 0}, {0, 1}, {1, 1}}) {
     const cv::Size size(sheet.cols / 2, sheet.rows * 47 / 100);
     expectF(colours(sheet({{cell.x * size.width, cell.y * size.height}, size})));
   }
 
   const cv::Mat3b frame = picture("frames/frame_000004.png");
-  for (const int top : {92, 423}) {  // depth, confidence
+  for (const int top : {92, 423}) {  // depth above, confidence below
     cv::Mat1b ground;
     cv::inRange(frame({972, top, 294, 220}), cv::Scalar::all(255), cv::Scalar::all(255), ground);
     expectF(ground == 0);
   }
-  cv::Mat1b high, low;  // in perspective, behind the camera that is drawn: red and blue points
+  cv::Mat1b high, low;  // in perspective, from behind the drawn camera: red and blue points
   const cv::Mat3b cloud = frame.colRange(0, 960);
   cv::inRange(cloud, cv::Scalar(0, 0, 150), cv::Scalar(60, 110, 255), high);
   cv::inRange(cloud, cv::Scalar(150, 0, 0), cv::Scalar(255, 150, 110), low);
@@ -152,7 +152,7 @@ TEST_F(GrowingMap, IsShownInAWindow) {
   for (int duration_s = 3; most <= 100 && duration_s <= 24; duration_s *= 2) {
     write(SyntheticRecording(duration_s));
     const std::string map = mapOf("data");
-    // Copies of the screen while the map grows.
+    // Copies the screen while the map grows.
     const Result result = shell(
         "xvfb-run -a -s '-screen 0 1280x720x24 -fbdir .' sh -c \""
         "'" EFM_EVENT_FUSION

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `map` is stopped at random times, by signals that it can catch and by one that it cannot. What it
-// leaves is complete and agrees, or does not look complete.
+// Stops `map` at random times with signals that it can catch and a signal that it cannot catch. The
+// result is complete and agrees, or is recognisably incomplete.
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -38,7 +38,7 @@ class Interruption : public AppTest {
            stride + " --set refinement.enabled=" + (refined ? "true" : "false");
   }
 
-  /// The time of a run that nothing interrupts.
+  /// Returns the duration of a run without interruption.
   Seconds timeOfARun() const {
     const auto begin = std::chrono::steady_clock::now();
     EXPECT_EQ(run(mapArguments(kStride[0], true)).status, 0);
@@ -61,7 +61,7 @@ class Interruption : public AppTest {
   }
   bool has(const char* file) const { return fs::exists(out() / file); }
 
-  /// A folder with a report: every file is whole, and all are of one run.
+  /// Expects of a folder with a report that every file is complete, and that all are of one run.
   void expectCompleteAndAgreeing() const {
     const nlohmann::json report = reportIn("out");
     const std::size_t keyframes = report["keyframes"];
@@ -114,7 +114,7 @@ TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
 TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
   ASSERT_EQ(run(mapArguments(kStride[0], false)).status, 0);
   const std::set<std::string> earlier = files();
-  // Of a killed run: the next one removes it before it reads.
+  // A file of a killed run: the next run removes it before it reads.
   const auto partial = out() / "map.partial-1.pcd";
   std::ofstream(partial) << "half";
   std::ofstream(out() / "report.partial.json") << R"({"recording": [], "process": 1})";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How much memory a keyframe takes beyond its events. A program of its own, because a process has
-// only one peak.
+// Measures the memory of a keyframe beyond its events. It is a separate program because a process
+// has only one peak.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace {
 constexpr std::int64_t kWindow_ns = 200'000'000;
 constexpr double kMegabyte = 1e6;
 
-/// A line of /proc/self/status, in bytes.
+/// Returns a value of /proc/self/status, in bytes.
 double memoryBytes(const std::string& key) {
   std::ifstream status("/proc/self/status");
   std::string word;
@@ -36,7 +36,7 @@ RigCamera hdCamera(double x_m) {
   return camera;
 }
 
-/// Events all over the sensor, in time order: where they lie costs no memory.
+/// Returns events all over the sensor, in time order. Their pixels do not change the memory.
 std::vector<Event> eventsEverywhere(std::size_t count, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::vector<Event> events(count);
@@ -53,11 +53,11 @@ double megabytesAbove(double before_bytes) {
   return (memoryBytes("VmHWM") - before_bytes) / kMegabyte;
 }
 
-/// Rays of events alone are 32 MB. One process has one peak: cases in the order of what they take.
+/// Rays of events take 32 MB. Cases in ascending order of memory, as a process has one peak.
 TEST(KeyframeMemory, OfAStereoPairAtHdHasBoundsAboveTheEventsWhateverTheSubintervals) {
   const std::vector<std::vector<Event>> events = {eventsEverywhere(2'000'000, 1),
                                                   eventsEverywhere(2'000'000, 2)};
-  // Quick and hand-held, so that there are many pose packets.
+  // Fast hand-held motion gives many pose packets.
   const Trajectory trajectory = test::RandomScene(1).motion(0, 1e-9 * kWindow_ns, 2, 2);
   const double before = memoryBytes("VmRSS");
   const auto map = [&](ExtractionMethod method, int subintervals) {
@@ -76,8 +76,8 @@ TEST(KeyframeMemory, OfAStereoPairAtHdHasBoundsAboveTheEventsWhateverTheSubinter
     ASSERT_GT(megabytesAbove(before), 0);
     EXPECT_LT(megabytesAbove(before), 150) << subintervals << " sub-intervals";
   }
-  // Aggregation keeps a byte a plane of each pixel that stands out: of events without any order
-  // every other one, 45 MB here.
+  // Aggregation keeps one byte per plane for each pixel that stands out. Events in random order let
+  // every second pixel stand out: 45 MB here.
   for (const int subintervals : {1, 8}) {
     ASSERT_TRUE(map(ExtractionMethod::kAggregated, subintervals));
     EXPECT_LT(megabytesAbove(before), 200) << subintervals << " sub-intervals";

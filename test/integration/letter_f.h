@@ -7,7 +7,7 @@
 
 namespace efm {
 
-/// A mask shows an F, upright and not mirrored: of its quarters the lower right one is empty.
+/// Expects that a mask shows an F, upright and not mirrored: its lower right quarter is empty.
 inline void expectF(const cv::Mat& mask) {
   const cv::Rect box = cv::boundingRect(mask);
   ASSERT_FALSE(box.empty());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// map.html in a browser without a window: it draws, answers to mouse and keys, and asks for
-// nothing.
+// Tests map.html in a browser without a window: it draws, reacts to mouse and keys, and loads no
+// other file.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -36,7 +36,7 @@ class MapPageInABrowser : public ProgramTest {
     if (browser_.empty()) GTEST_SKIP() << "there is no browser: the Debian package chromium";
   }
 
-  /// Opens a copy of the page with the probe in it. @return what the probe measured.
+  /// Opens a copy of the page with the probe in it. @return the probe's measurements.
   json measure(const std::filesystem::path& page, const std::string& options = "",
                const std::string& probe = "page_probe.js") const {
     std::string html = contentOf(page);
@@ -65,14 +65,14 @@ class MapPageInABrowser : public ProgramTest {
     return json::parse(result.out.substr(at + begin.size(), end - at - begin.size()));
   }
 
-  /// What holds for every page.
+  /// Expects the properties that every page must have.
   static void expectSound(const json& measured) {
     EXPECT_THAT(measured["problems"], IsEmpty()) << measured["problems"];
     EXPECT_THAT(measured["requests"], IsEmpty()) << measured["requests"];
     EXPECT_EQ(measured["refused"], 3) << "the page's policy refuses requests of three kinds";
     EXPECT_EQ(measured["gl_error"], 0);
     for (const char* change : {"turned", "moved", "zoomed", "turned_by_key", "aimed", "coloured"}) {
-      // A change of the view moves most of what is drawn.
+      // A change of the view moves most of the drawn pixels.
       EXPECT_GT(measured[change].get<double>(), 0.5 * measured["drawn"].get<double>()) << change;
     }
     const json& grown = measured["grown"];
@@ -96,7 +96,7 @@ TEST_F(MapPageInABrowser, OfTheDeskDrawsAndAnswers) {
   ASSERT_EQ(run("map -q '" + desk + "' --out \"" + out + "\"").status, 0);
   const json light = measure(out + "/map.html");
   expectSound(light);
-  // A semi-dense map: lines on an empty ground. 1026 x 768 pixels.
+  // A semi-dense map has lines on an empty ground. The view has 1026 x 768 pixels.
   EXPECT_GT(light["drawn"], 5000);
   EXPECT_LT(light["drawn"], 400000);
   EXPECT_EQ(light["picture_sizes"], json({{346, 260}, {346, 260}})) << "depth map and events";
@@ -114,7 +114,7 @@ TEST_F(MapPageInABrowser, OfTheDeskDrawsAndAnswers) {
       << "the same on another ground";
 }
 
-/// From base 64.
+/// Decodes base 64.
 std::vector<std::uint8_t> bytesOf(const std::string& text) {
   std::vector<std::uint8_t> bytes;
   std::uint32_t bits = 0;
@@ -132,7 +132,7 @@ std::vector<std::uint8_t> bytesOf(const std::string& text) {
   return bytes;
 }
 
-/// Terraces of 300 x 300 m, seen by 500 keyframes.
+/// The map has terraces of 300 x 300 m, seen by 500 keyframes.
 TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> coordinate(0, 300);
@@ -153,7 +153,7 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   cv::Mat1f depth(480, 640);
   cv::Mat_<cv::Vec2i> events(depth.size());
   for (int i = 0; i < 500; ++i) {
-    cv::randu(depth, -10, 10);  // noise: the largest pictures there are
+    cv::randu(depth, -10, 10);  // noise gives the largest pictures
     cv::randu(events, 0, 3);
     pictures.add(depth, events);
   }
@@ -174,14 +174,14 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
                              HasSubstr("left out to keep it small"), HasSubstr("made-up-warning")));
 }
 
-/// The mean colour of what is drawn in some rows of a box, in the order of OpenCV.
+/// Returns the mean colour (BGR) of the drawn pixels in some rows of a box.
 cv::Vec3d colourOf(const cv::Mat3b& picture, const cv::Mat1b& mask, const cv::Rect& rows) {
   const cv::Scalar mean = cv::mean(picture(rows), mask(rows));
   return {mean[0], mean[1], mean[2]};
 }
 
-/// An F that gets higher, more confident, better supported and newer from its foot to its top, in
-/// worlds that are turned against the view: as a person sees it, and with the colours of the bar.
+/// Height, confidence, support and keyframe number of an F rise from its foot to its top. The world
+/// is rotated against the view. The F must be upright for a person and have the bar's colours.
 TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
   Eigen::Matrix3d y_down;  // the frame of the first camera
   y_down << 1, 0, 0, 0, 0, -1, 0, 1, 0;
@@ -189,7 +189,7 @@ TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
   const struct {
     const char* view;
     Eigen::Matrix3d R_world_view;  ///< The view has x right, y forwards and z up.
-    Eigen::Vector3d along;         ///< The stem.
+    Eigen::Vector3d along;         ///< Direction of the F's stem.
   } cases[] = {{"front", y_down, {0, 0, 1}}, {"top", back, {0, 1, 0}}};
   constexpr int kKeyframes = 11;
   for (const auto& [view, R_world_view, along] : cases) {
@@ -207,7 +207,7 @@ TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
       add(0.0025 * i, 2);
       add(0.00125 * i, 1);
     }
-    for (int i = 0; i < 40; ++i) add(0.001 * i, 0);  // enough for the low end of the bar
+    for (int i = 0; i < 40; ++i) add(0.001 * i, 0);  // enough points for the low end of the bar
     Eigen::Matrix3d R_view_cam;                      // columns: x right, y down, z forwards
     R_view_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
     std::vector<StampedPose> trajectory;
@@ -239,7 +239,7 @@ TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
       expectF(mask);
       ++seen;
       if (colour == "height" && along.z() == 0) continue;
-      // The view is from the middle of the letter: half of the way lies at half of the height.
+      // The view is centred on the F: the middle of the colour range is at half of its height.
       const auto& bar = drawn["bar"];
       EXPECT_EQ(drawn["direction"], "linear-gradient(to right");
       for (const double share : {0.0, 0.5, 1.0}) {

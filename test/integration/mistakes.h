@@ -13,7 +13,7 @@
 
 namespace efm {
 
-/// A recording as a dataset folder, in memory: for tests that change one thing about it.
+/// A recording as a dataset folder, in memory. Tests change one thing in it.
 struct DraftRecording {
   /// Adds a line of text for an event.
   using EventLine = void (*)(const Event&, std::string& text);
@@ -22,42 +22,41 @@ struct DraftRecording {
   std::vector<StampedPose> poses;
   std::string camchain;
   EventLine event_line = usualLine;
-  /// Files by their names in the folder, also instead of those that the other fields give.
+  /// Contents of files by their names in the folder. They replace files that the other fields give.
   std::map<std::string, std::string> files;
 
-  /// "1.000002000 70 216 0"
+  /// Adds a line "1.000002000 70 216 0".
   static void usualLine(const Event& event, std::string& text);
 
-  /// Replaces a part of the camera chain. It is a failure of the test if the chain has no such
-  /// part.
+  /// Replaces a part of the camera chain. The test fails if the chain does not contain the part.
   void replaceInCamchain(const std::string& part, const std::string& by);
-  /// The events of a camera as text.
+  /// Returns the events of a camera as text.
   std::string eventText(std::size_t camera) const;
-  /// The poses as text, in the TUM format.
+  /// Returns the poses as text in the TUM format.
   std::string poseText() const;
 };
 
-/// @param folder of two cameras and poses, without depth maps.
+/// Reads a dataset folder. @param folder of two cameras and poses, without depth maps.
 DraftRecording readDraft(const std::filesystem::path& folder);
 
-/// Writes the folder. @param base what `readDraft` read: files without a change become links to its
-/// files.
+/// Writes the folder. @param base the draft that `readDraft` returned: files that did not change
+/// become links to the files of `base_folder`.
 void writeDraft(const DraftRecording& draft, const DraftRecording& base,
                 const std::filesystem::path& base_folder, const std::filesystem::path& folder);
 
-/// A deliberate mistake in a recording or on the command line, and what `map` says of it.
+/// A deliberate mistake in a recording or on the command line, and the messages of `map` about it.
 struct Mistake {
   const char* name;
   std::function<void(DraftRecording&)> make;
-  /// The beginning of each line on stderr, behind "event-fusion: ". A number behind ~ is met within
-  /// a fifth; a line with # is expected twice, with 0 and 1. "…" as the last one: others may
-  /// follow. With an error the exit status is 1, otherwise 0.
+  /// Expected lines on stderr: the beginning of each, without "event-fusion: ". A number after ~
+  /// may differ by a fifth. A line with # is expected twice, with 0 and 1. If "…" is the last line,
+  /// others may follow. The exit status is 1 if a line is an error, otherwise 0.
   std::vector<std::string> lines;
-  std::string arguments{};  ///< Of `map`, further ones.
+  std::string arguments{};  ///< Additional arguments of `map`.
 };
 
-/// The lines where poses and events are never at the same time, with others.
-/// @param spans of the events and of the poses, the hint of the warning, the seconds between both.
+/// Returns `lines` and the messages about poses and events that are never at the same time.
+/// @param spans times of the events, of the poses, hint of the warning, seconds between the times.
 inline std::vector<std::string> apart(const std::array<std::string, 4>& spans,
                                       std::vector<std::string> lines = {}) {
   const auto& [events, poses, hint, gap_s] = spans;
@@ -69,7 +68,7 @@ inline std::vector<std::string> apart(const std::array<std::string, 4>& spans,
   return lines;
 }
 
-/// Writes a file into the recording's folder.
+/// Returns a change that writes a file into the recording's folder.
 inline std::function<void(DraftRecording&)> file(const std::string& name, const std::string& text) {
   return [name, text](DraftRecording& draft) { draft.files[name] = text; };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// No mistake passes without a word: a warning with a name, or an error.
+// Tests that each mistake gives a warning with a name, or an error.
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +36,7 @@ class Mistakes : public AppTest {
           "[keyframes]\nwindow_s = 0.2\nstride_s = 0.2\n[dsi]\nmin_depth_m = 0.55\n"
           "max_depth_m = 5\n[fusion]\nacross_cameras = harmonic\n");
   }
-  /// Maps the recording with a change.
+  /// Maps the recording after a change.
   Result mapWith(const Mistake& mistake) const {
     for (const char* name : {"data", "out"}) std::filesystem::remove_all(folder() / name);
     DraftRecording draft = base_;
@@ -48,7 +48,7 @@ class Mistakes : public AppTest {
   DraftRecording base_;
 };
 
-/// Whether a line begins as expected.
+/// Returns whether a line begins as expected.
 bool begins(const std::string& line, const std::string& expected) {
   const char* at = line.c_str();
   for (const char* e = expected.c_str(); *e != '\0';) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A tracker that is wrong within the window, on the simulated desk.
+// Tests a tracker that is wrong within the window, on the simulated desk.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
     return mapper.map(window(), events, trajectory).value();
   }
 
-  /// Median of the relative depth errors.
+  /// Returns the median of the relative depth errors.
   static double error(const KeyframeDepthMap& keyframe) {
     std::vector<double> errors;
     for (const DepthPair& pair : desk().pairs(keyframe)) {
@@ -67,8 +67,8 @@ TEST_F(MotionCorrectionOnTheDesk, AWrongVelocityIsFoundAndDepthIsNearlyThatOfExa
         correctedTrajectory(truth(), window(), {-sign * linear_m_s, -sign * angular_rad_s});
     const KeyframeDepthMap corrected = map(wrong, true);
     ASSERT_TRUE(corrected.motion_correction);
-    // At the ends of the window, 0.1 s away, 0.1 degrees are half a pixel, which is what votes are
-    // spread over. Sliding looks much like turning, but for how depths differ: half of it is found.
+    // At the ends of the window, 0.1 s away, 0.1 degrees are half a pixel, as wide as a vote. A
+    // shift looks like a rotation unless depths differ: half of the shift is found.
     EXPECT_LT((corrected.motion_correction->angular_rad_s - sign * angular_rad_s).norm(),
               1.0 * kRadiansPerDegree);
     EXPECT_LT((corrected.motion_correction->linear_m_s - sign * linear_m_s).norm(), 0.035);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The real slider in another format, on another clock and in other units (docs/your-data.md) gives
-// the same map.
+// Tests that the real slider in another format, on another clock and in other units
+// (docs/your-data.md) gives the same map.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ const fs::path kSlider = EFM_SHARED_DATA "/slider_depth";
 
 using OwnRecording = AppTest;
 
-/// A time of the slider, "0.003811000", in nanoseconds of a clock that began in 1970.
+/// Returns a time of the slider, "0.003811000", in nanoseconds of a clock that began in 1970.
 std::string nanosecondsOf(const std::string& seconds) {
   const std::size_t point = seconds.find('.');
   return std::to_string(1'600'000'000 + std::stoll(seconds.substr(0, point))) +
@@ -37,7 +37,7 @@ std::string eventsAsCsv() {
   return text;
 }
 
-/// Millimetres; w first.
+/// Returns the poses in millimetres; the quaternion's w comes first.
 std::string posesAsCsv() {
   std::ifstream lines(kSlider / "groundtruth.txt");
   std::string text = "t_ns,qw,qx,qy,qz,x_mm,y_mm,z_mm\n";

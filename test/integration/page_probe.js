@@ -1,15 +1,15 @@
 // Runs at the end of a copy of map.html: uses the page as a person does, and leaves in the element
-// "measured" what came of it, as JSON. `problems` is filled by the script at the page's beginning.
+// "measured" the results, as JSON. `problems` is filled by the script at the page's beginning.
 const measured = {};
 
-/// The picture on the canvas, drawn now.
+/// Draws the view. @return the picture on the canvas.
 function pixels() {
   draw();
   const {width, height} = canvas, bytes = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
   return new Uint32Array(bytes.buffer);
 }
-/// The number of pixels that differ from the background.
+/// Returns the number of pixels that differ from the background.
 function drawnOf(picture) {
   const back = styleColour("--back").reduce((sum, c, k) => sum + Math.round(255 * c) * 256 ** k, 0);
   return picture.reduce((sum, pixel) => sum + ((pixel & 0xffffff) === back ? 0 : 1), 0);
@@ -32,7 +32,7 @@ function choose(id, value, type = "input") {
 }
 const press = key => canvas.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true}));
 
-/// @return how many pixels a change of the view changes; goes back to the start afterwards.
+/// Changes the view and goes back to the start. @return the number of pixels that changed.
 function effectOf(change) {
   look("start");
   const before = pixels();
@@ -44,7 +44,7 @@ function effectOf(change) {
 const settled = () => new Promise(done => setTimeout(done, 400));
 
 async function probe() {
-  canvas.setPointerCapture = () => {};  // refuses pointers that are not real
+  canvas.setPointerCapture = () => {};  // the original rejects pointers that are not real
   measured.points = map.points;
   measured.dark = darkTheme.matches;
   measured.drawn = drawnOf(pixels());
@@ -52,7 +52,7 @@ async function probe() {
   measured.moved = effectOf(() => drag(80, 30, {shiftKey: true}));
   measured.zoomed = effectOf(() => canvas.dispatchEvent(new WheelEvent("wheel", {deltaY: -300})));
   measured.turned_by_key = effectOf(() => press("ArrowLeft"));
-  measured.aimed = effectOf(() => {  // a double click turns about the point that is there
+  measured.aimed = effectOf(() => {  // a double click makes its point the centre of rotation
     let p = null;
     for (let i = 0; i < map.points && !p; ++i) p = onScreen(pointAt(i), projection(canvas.clientWidth / canvas.clientHeight).matrix);
     const box = canvas.getBoundingClientRect();
@@ -60,7 +60,7 @@ async function probe() {
   });
   measured.coloured = effectOf(() => choose("colour", "confidence", "change"));
 
-  // The map grows with time: the points, without path and cameras.
+  // The map grows with time; only points are drawn, without path and cameras.
   const toggleLines = () => ["path", "frusta"].forEach(id => element(id).click());
   toggleLines();
   measured.grown = [];
@@ -86,7 +86,7 @@ async function probe() {
   measured.picture_sizes = ["picture", "event-picture"].map(id => element(id))
     .map(image => image.checkVisibility() ? [image.naturalWidth, image.naturalHeight] : []);
 
-  // No request leaves the page, not even one that it would try.
+  // The page makes no request, and the browser blocks requests that it tries.
   measured.problems = problems.slice();
   measured.requests = performance.getEntriesByType("resource").map(entry => entry.name)
     .filter(name => !name.startsWith("data:"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Mistakes about the poses.
+// Mistakes in the poses.
 
 #include <cmath>
 
@@ -11,7 +11,7 @@ namespace {
 
 using Draft = DraftRecording;
 
-/// Changes each pose.
+/// Returns a change of each pose.
 template <typename Change>
 std::function<void(Draft&)> eachPose(Change change) {
   return [change](Draft& draft) {
@@ -19,7 +19,7 @@ std::function<void(Draft&)> eachPose(Change change) {
   };
 }
 
-/// Replaces the numbers from the second on in line 101 of the poses.
+/// Returns a change of line 101 of the poses: `numbers` replace all its numbers but the time.
 std::function<void(Draft&)> oddPose(const std::string& numbers) {
   return [numbers](Draft& draft) {
     std::string text = draft.poseText();
@@ -31,7 +31,7 @@ std::function<void(Draft&)> oddPose(const std::string& numbers) {
   };
 }
 
-/// 100 Hz, from 1.4 s on.
+/// Returns poses at 100 Hz that start at 1.4 s.
 std::string posesInMicroseconds() {
   std::string text;
   for (int i = 0; i < 50; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A real rig's calibration on its real, smoothed trajectory through a simulated room, as a user
-// runs it: simulate, map with the rig's own option file, compare with the exact truth.
+// Tests a real rig's calibration on its real, smoothed trajectory in a simulated room, as a user:
+// simulate, map with the rig's own option file, compare with the exact truth.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -39,14 +39,14 @@ TEST_F(RealRig, MvsecsDroneMapsASimulatedRoom) {
   const double error_steps = evaluation.all.median_inverse / step;
   std::cout << "median inverse depth error: " << error_steps << " plane steps of "
             << evaluation.all.points << " points\n";
-  // Half the points within one plane: what the planes can tell.
+  // Half of the points are within one plane step, the resolution of the planes.
   EXPECT_LE(error_steps, 1);
 }
 
-/// Small real recordings of one camera, without options.
+/// Tests with small real recordings of one camera, without options.
 class RealRecording : public RealRig {
  protected:
-  /// @return what the program printed; empty without the recording.
+  /// @return the program's output; empty if the recording is missing.
   std::string map(const std::string& name, const std::string& events,
                   const std::string& options = "") const {
     const auto data = std::filesystem::path(EFM_SHARED_DATA) / "real_small" / name;
@@ -66,7 +66,7 @@ TEST_F(RealRecording, APanTiltHeadMapsItsDeskWithAnyNumberOfPlanes) {
       const std::string output =
           map(name, "events.txt.gz", std::string("--set dsi.num_planes=") + planes);
       if (output.empty()) GTEST_SKIP() << "there is no recording " << name;
-      // The desk and the board behind it are 0.8 to 1.4 m away.
+      // The desk and the board behind it are at 0.8 to 1.4 m.
       int depths = 0, on_the_desk = 0;
       for (const auto& entry : std::filesystem::directory_iterator(folder() / "out/keyframes")) {
         const cv::Mat1f depth =

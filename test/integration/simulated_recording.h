@@ -11,14 +11,14 @@
 
 namespace efm::test {
 
-/// A preset with its events and poses, to be mapped in several ways and held against the truth.
+/// A preset with its events and poses. Tests map it in several ways and compare with the truth.
 class SimulatedRecording {
  public:
   explicit SimulatedRecording(const SimulationOptions& options);
-  /// @param events of each camera of the simulation.
+  /// @param events one vector per camera of the simulation.
   SimulatedRecording(Simulation simulation, std::vector<std::vector<Event>> events);
-  /// desk_stereo with seed 1, simulated once for all tests (the fixture `recordings` of ctest).
-  /// @throws std::runtime_error where it has not been simulated.
+  /// Returns desk_stereo with seed 1, simulated once for all tests (ctest's fixture `recordings`).
+  /// @throws std::runtime_error if it has not been simulated.
   static const SimulatedRecording& desk();
 
   const Simulation& simulation() const { return simulation_; }
@@ -27,14 +27,14 @@ class SimulatedRecording {
 
   std::vector<KeyframeDepthMap> map(const FusionMapperOptions& options) const;
 
-  /// The true z-depth in the keyframe's view.
+  /// Returns the true z-depth in the keyframe's view, metres.
   cv::Mat1f truthOf(const KeyframeDepthMap& keyframe) const;
-  /// Estimate and truth wherever there is an estimate, the truth within one pixel.
+  /// Returns estimate and truth of each pixel with an estimate; the truth is within one pixel.
   std::vector<DepthPair> pairs(const KeyframeDepthMap& keyframe) const;
 
-  /// Median distance of a cloud's points to the nearest point of any surface, metres.
+  /// Returns the median distance of a cloud's points to the nearest point of any surface, metres.
   double medianDistanceToSurfaces(const MapCloud& cloud) const;
-  /// Share of a cloud's points that are farther than this from any surface.
+  /// Returns the share of a cloud's points that are farther than `distance_m` from any surface.
   double shareBeyond(const MapCloud& cloud, double distance_m) const;
 
  private:
@@ -43,7 +43,7 @@ class SimulatedRecording {
   std::vector<StampedPose> poses_;
 };
 
-/// All keyframes in one cloud of voxels of a centimetre.
+/// Returns all keyframes in one cloud with voxels of 1 cm.
 MapCloud::ConstPtr globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
                                  const GlobalCloudOptions& options = {});
 

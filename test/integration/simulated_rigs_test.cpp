@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The method end to end on other simulated rigs than the desk's.
+// Tests the whole method on simulated rigs other than the desk's.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -14,7 +14,7 @@ namespace {
 TEST(RoomStereo, TheMapLiesOnTheTrueSurfaces) {
   SimulationOptions simulation;
   simulation.preset = "room_stereo";
-  simulation.duration_s = 1.6;  // of 8 s around the room; the whole takes five times as long
+  simulation.duration_s = 1.6;  // of 8 s around the room; 8 s take five times as long
   const test::SimulatedRecording room(simulation);
   FusionMapperOptions options;
   options.policy.window_s = 0.3;
@@ -31,7 +31,7 @@ TEST(RoomStereo, TheMapLiesOnTheTrueSurfaces) {
   // A plane step is 1 % of the range of inverse depth: 2 cm at 1.4 m, 9 cm at 3 m.
   EXPECT_LE(median_m, 0.06);
 
-  // What keyframes say of each other takes outliers, and little else.
+  // The check between keyframes removes outliers and few other points.
   GlobalCloudOptions map;
   const double share = room.shareBeyond(*points, 0.2);
   map.consistency.consistency = Consistency::kNone;
@@ -50,7 +50,7 @@ TEST(RoomStereo, TheMapLiesOnTheTrueSurfaces) {
   EXPECT_GT(seen_twice->size(), all->size() * 80 / 100);
 }
 
-/// Three cameras that look in different directions.
+/// The three cameras look in different directions.
 TEST(Trinocular, ThreeCamerasAreSurerThanTwoWhereAllVote) {
   SimulationOptions simulation;
   simulation.preset = "trinocular";
@@ -63,7 +63,7 @@ TEST(Trinocular, ThreeCamerasAreSurerThanTwoWhereAllVote) {
     options.keyframe.sweep.fusion.across_cameras = FusionRule::kHarmonic;
     options.keyframe.camera_maps = true;
     auto keyframes = recording.map(options);
-    EXPECT_EQ(keyframes.size(), 2U);  // the second one ends with the recording
+    EXPECT_EQ(keyframes.size(), 2U);  // the second window ends with the recording
     return std::move(keyframes.at(0));
   };
   const KeyframeDepthMap all = keyframe({0, 1, 2});
