@@ -53,8 +53,8 @@ class Message:
 def event_arrays(events, size, cdr):
     """dvs_msgs/EventArray, prophesee_event_msgs/EventArray."""
     packed = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("n", "<u4"), ("p", "u1")])
-    # In CDR, the seconds lie at a multiple of 4, and the events at one of 2: the first event has no gap before the
-    # seconds, all others have one.
+    # In CDR, the seconds start at a multiple of 4 bytes and each event at a multiple of 2: all events but the first
+    # have a gap before the seconds.
     first = np.dtype({"names": packed.names, "formats": [f for f, _ in packed.fields.values()], "offsets": [0, 2, 4, 8, 12],
                       "itemsize": 14})
     others = np.dtype({"names": packed.names, "formats": [f for f, _ in packed.fields.values()], "offsets": [0, 2, 6, 10, 14],
@@ -67,7 +67,7 @@ def event_arrays(events, size, cdr):
             values["s"], values["n"] = part["t"] // 10**9, part["t"] % 10**9
             message.data += values.tobytes()
         if cdr:
-            del message.data[-1:]  # no gap behind the last event
+            del message.data[-1:]  # no gap after the last event
         yield int(packet["t"][-1]) + LOG_DELAY_NS, message.bytes()
 
 
@@ -125,7 +125,7 @@ def pose_messages(poses, cdr):
         yield t_ns + LOG_DELAY_NS, Message(cdr).header(t_ns, sequence).add("d", *numbers).bytes()
 
 
-# Text of the messages' definitions, and their MD5 sums in ROS 1.
+# The text of the message definitions, and their MD5 sums in ROS 1.
 HEADER_1 = "uint32 seq\ntime stamp\nstring frame_id\n"
 HEADER_2 = "builtin_interfaces/Time stamp\nstring frame_id\n"
 RULE = "=" * 80 + "\n"

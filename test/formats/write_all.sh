@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: BSD-3-Clause
-# Writes a dataset folder in all formats, with programs that are not ours.
+# Writes a dataset folder in all formats, with independent programs.
 #   write_all.sh DATASET_FOLDER OUT
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)

@@ -71,7 +71,7 @@ def write_m3ed(out, cameras, calibration, poses):
             group = file.create_group(f"prophesee/{side}")
             for name, values in events.items():
                 group.create_dataset(name, data=values, compression="lzf", maxshape=(None,))
-            if events["t"][-1] < 10**10:  # M3ED's times begin at 0; today's would make a huge index
+            if events["t"][-1] < 10**10:  # M3ED's times begin at 0; current times would make a huge index
                 group["ms_map_idx"] = index_of_milliseconds(events["t"])
             camera = calibration[f"cam{n}"]
             T_c0_ci = T_c0_ci @ np.linalg.inv(np.array(camera.get("T_cn_cnm1", np.eye(4)), dtype=float))

@@ -56,7 +56,7 @@ std::vector<std::size_t> rareOnes(const std::vector<std::size_t>& sizes) {
 
 }  // namespace efm
 
-// The forms for arrays call these. Sanitizers have one of their own without an exception.
+// The array forms call these operators. Sanitizers have another array form without an exception.
 void* operator new(std::size_t size) {
   if (efm::fails(size)) throw std::bad_alloc();
   if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
