@@ -16,13 +16,13 @@ namespace efm {
 
 struct RecordedMessage {
   std::string topic;
-  std::string type;  // "dvs_msgs/EventArray"
+  std::string type;  // e.g. "dvs_msgs/EventArray"
   std::int64_t log_ns;
   std::string data;
 };
 using RecordedMessages = std::vector<RecordedMessage>;
 
-/// The number of each topic, in the order in which they come.
+/// Returns the topics in the order of their first messages.
 inline std::vector<std::pair<std::string, std::string>> topicsIn(const RecordedMessages& messages) {
   std::vector<std::pair<std::string, std::string>> topics;
   for (const RecordedMessage& message : messages) {
@@ -53,7 +53,7 @@ inline std::string mcapRecordOf(int op, const std::string& content) {
   return bytes + content;
 }
 
-/// Without chunks and without a summary, as a crashed writer leaves it.
+/// Returns a file without chunks and without a summary, as a crashed writer leaves it.
 inline std::string mcapBytes(const RecordedMessages& messages) {
   std::string file("\x89MCAP0\r\n", 8);
   file += mcapRecordOf(1, sizedText("ros2") + sizedText("test"));
@@ -76,7 +76,7 @@ inline std::string mcapBytes(const RecordedMessages& messages) {
   return file;
 }
 
-/// A header of fields, and data.
+/// Returns a record: a header of fields, then data.
 inline std::string ros1Record(const std::vector<std::pair<std::string, std::string>>& fields,
                               const std::string& data) {
   std::string header;
@@ -96,7 +96,7 @@ inline std::string ros1Time(std::int64_t t_ns) {
          wordBytes(static_cast<std::uint32_t>(t_ns % 1'000'000'000));
 }
 
-/// A chunk with the first message, and one for each further `per_chunk`, not compressed.
+/// Returns a bag without compression: `per_chunk` messages per chunk, the first message alone.
 inline std::string ros1BagBytes(const RecordedMessages& messages, std::size_t per_chunk = 1000) {
   const std::string magic = "#ROSBAG V2.0\n";
   const auto bag_header = [](std::uint64_t index) {

@@ -33,7 +33,7 @@ constexpr const char* kOdometry = "nav_msgs/Odometry";
 constexpr std::int64_t kStartNs = 1'700'000'000'000'000'000;
 constexpr std::int64_t kMsNs = 1'000'000;
 
-/// `count` events of an interval, in time order, in whole microseconds.
+/// Returns `count` events of an interval in time order, in whole microseconds.
 std::vector<Event> someEvents(std::int64_t from_ns, std::int64_t length_ns, int count) {
   std::mt19937 random(static_cast<unsigned>(from_ns / 1000));
   std::vector<Event> events;
@@ -45,7 +45,7 @@ std::vector<Event> someEvents(std::int64_t from_ns, std::int64_t length_ns, int 
   return events;
 }
 
-/// The packets of 10 ms of a camera, each recorded 2 ms after its end.
+/// Returns a camera's packets of 10 ms. Each is recorded 2 ms after its end.
 std::vector<std::vector<Event>> packetsFrom(std::int64_t from_ns, int count) {
   std::vector<std::vector<Event>> packets;
   for (int i = 0; i < count; ++i) {
@@ -63,8 +63,8 @@ RecordedMessages arraysOf(const std::string& topic, const std::vector<std::vecto
   return messages;
 }
 
-/// EVT3 packets. The sensor's clock is zero at kStartNs - 3 s; the host is late by 3, 2, 1, 0, …
-/// ms, and more.
+/// Returns EVT3 packets. The sensor's clock is zero at kStartNs - 3 s. The host is late by 3, 2, 1,
+/// 0, … ms plus `late_ns`.
 RecordedMessages evt3Of(const std::string& topic, const std::vector<std::vector<Event>>& packets,
                         RosBytes kind, std::int64_t late_ns = 0) {
   RecordedMessages messages;
@@ -132,7 +132,7 @@ class BagRecording : public TemporaryFolder {
 };
 
 TEST_F(BagRecording, EachContainerGivesAllPosesAndTheEventsFromTheSoughtTimeOn) {
-  // 40 s: the clock of EVT3 wraps twice; 300 of 4000 periods have events.
+  // In 40 s the clock of EVT3 wraps twice. 300 of 4000 periods have events.
   std::vector<std::vector<Event>> packets;
   for (int i = 0; i < 300; ++i) {
     packets.push_back(someEvents(kStartNs + i * 133 * kMsNs, 10 * kMsNs, 20));
@@ -147,7 +147,7 @@ TEST_F(BagRecording, EachContainerGivesAllPosesAndTheEventsFromTheSoughtTimeOn) 
     }
     messages = together(messages, {{"/imu", "sensor_msgs/Imu", kStartNs, "any bytes"}});
     const auto half = messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2);
-    // In the wrong order: bags are sorted by time.
+    // The files are in the wrong order: the reader sorts bags by time.
     const std::vector<fs::path> files = {write("b ?#%20", container, {half, messages.end()}),
                                          write("a", container, {messages.begin(), half})};
     for (const double t_s : {-1.0, 0.0, 0.5, 13.77, 20.0, 30.0, 39.7, 60.0}) {
@@ -162,7 +162,7 @@ TEST_F(BagRecording, EachContainerGivesAllPosesAndTheEventsFromTheSoughtTimeOn) 
       for (const auto& camera : recording.cameras) {
         camera->seek(t_ns);
         const std::vector<Event> read = readStream(*camera);
-        // The end of all events, with few before the time.
+        // The reader gives the last part of all events, with few events before the time.
         ASSERT_LE(read.size(), all.size());
         EXPECT_TRUE(std::equal(read.rbegin(), read.rend(), all.rbegin()));
         const auto from = std::partition_point(
@@ -198,7 +198,7 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
     fs::path file;
     std::vector<std::string> topics;
     std::vector<std::string> cameras;
-    std::int64_t pose_ns;  // 0: none
+    std::int64_t pose_ns;  // 0 if there are no poses
   };
   const std::vector<std::string> natural = {"/cam002/events", "/cam2/events", "/cam10/events",
                                             "/cama/events"};
@@ -259,7 +259,7 @@ TEST_F(BagRecording, OneCameraHasItsCalibrationFromCameraInfo) {
 }
 
 TEST_F(BagRecording, LostPacketsAreCountedAndTheClockGoesOn) {
-  const auto packets = packetsFrom(kStartNs, 3'000);  // 30 s
+  const auto packets = packetsFrom(kStartNs, 3'000);  // 30 s of packets
   for (const Container container : {Container::kRos1, Container::kDb3}) {
     RecordedMessages messages = evt3Of("/events", packets, bytesOf(container));
     std::vector<std::vector<Event>> left = packets;
@@ -267,7 +267,7 @@ TEST_F(BagRecording, LostPacketsAreCountedAndTheClockGoesOn) {
       messages.erase(messages.begin() + first, messages.begin() + first + count);
       left.erase(left.begin() + first, left.begin() + first + count);
     }
-    // The last one does not say its time.
+    // The last packet does not contain its time.
     const std::int64_t stamp_ns = kStartNs + 40'000 * kMsNs;
     messages.push_back({"/events", kPacket, stamp_ns,
                         eventPacket(bytesOf(container), stamp_ns, 3'110, "evt3",
@@ -341,13 +341,13 @@ TEST_F(BagRecording, LibcaersTimesAreTheHostsWhateverTheStamps) {
       RecordedMessages messages;
       std::vector<std::vector<Event>> packets;
       for (std::int64_t i = 0; i < 30; ++i) {
-        if (i == 10 || i == 11) continue;  // lost
+        if (i == 10 || i == 11) continue;  // lost packets
         packets.push_back(someEvents(kStartNs + i * 10 * kMsNs, 10 * kMsNs, 30));
-        // The 31 bits begin again in packet 20.
+        // The time of 31 bits starts again at 0 in packet 20.
         const std::int64_t low_base_ns =
             kStartNs + 205 * kMsNs - kWrapNs + (i > 20 ? kWrapNs : std::int64_t{0});
         const std::int64_t base_ns = packed ? packets.back().front().t_ns : low_base_ns;
-        // The sensor's clock and the host's differ by 0.1 s more with each packet.
+        // The difference between the sensor's and the host's clock grows by 0.1 s per packet.
         const std::int64_t stamp_ns = kStartNs + i * 110 * kMsNs;
         messages.push_back({"/events", kPacket, stamp_ns,
                             eventPacket(kind, stamp_ns, static_cast<std::uint64_t>(i),
@@ -458,7 +458,7 @@ TEST_F(BagRecording, WrongFilesAreErrorsThatSayWhatToDo) {
   writeFile(folder() / "good/metadata.yaml",
             "rosbag2_bagfile_information:\n  relative_file_paths: [good/part.db3]\n");
   EXPECT_EQ(readStream(*open({folder() / "good"}).cameras.at(0)).size(), 150U);
-  const fs::path views = folder() / "good/part.db3";  // a view could be a query without an end
+  const fs::path views = folder() / "good/part.db3";  // a view could be an endless query
   sqlite3* database = nullptr;
   sqlite3_open(views.c_str(), &database);
   sqlite3_exec(database,
@@ -483,13 +483,13 @@ TEST_F(BagRecording, ARealBagOfAPropheseeCameraHasAllEvents) {
   EXPECT_EQ(camera.lostPackets(), 0U);
   EXPECT_TRUE(std::is_sorted(events.begin(), events.end(),
                              [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; }));
-  // event_camera_py's sum (µs) is 2,885,601,049,874 with the 4,156 triggers. One offset serves for
-  // all events.
+  // event_camera_py's sum (µs) is 2,885,601,049,874 with the 4,156 triggers. All events have the
+  // same offset.
   constexpr std::int64_t kFirstUs = 7'139'845;
   std::int64_t sum_us = 0;
   for (const Event& event : events) sum_us += kFirstUs + (event.t_ns - events[0].t_ns) / 1000;
   EXPECT_EQ(sum_us, 2'851'601'611'994);
-  // The first packet's stamp is 4.0 ms behind the least delay.
+  // The first packet's stamp is 4.0 ms later than the least delay.
   EXPECT_NEAR(static_cast<double>(1'675'956'550'318'674'902 - events.front().t_ns), 4e6, 0.5e6);
 }
 

@@ -33,7 +33,7 @@ using testing::StartsWith;
 
 constexpr std::int64_t kFirstNs = 1'700'000'000'000'000'123;
 
-/// A recording of 2 s of one camera, in chunks of 1 MiB.
+/// Tests a recording of 2 s of one camera in chunks of 1 MiB.
 class Mcap : public TemporaryFolder {
  protected:
   Mcap() : file_(folder() / "recording.mcap") {
@@ -96,7 +96,7 @@ TEST_F(Mcap, LongPacketsAreDivided) {
   const auto writer = openMcapWriter(file_, rig_);
   std::vector<Event> events;
   for (std::int64_t i = 0; i < 300'000; ++i) events.push_back({kFirstNs + i * 40'000, 1, 2, true});
-  writer->addEvents(0, events);  // 12 s
+  writer->addEvents(0, events);  // 12 s of events
   writer->close();
   EXPECT_TRUE(readStream(*open().cameras.at(0)) == events);
 }
@@ -117,7 +117,7 @@ TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
   write(2'000);
   const std::string bytes = readText(file_);
   const std::string half = bytes.substr(0, bytes.size() / 2);
-  // The rest is missing, or was not written any more.
+  // The rest is missing, or is zeros because it was never written.
   for (const auto& [zeros, expected] : {std::make_pair(std::size_t{0}, "which may be cut off"),
                                         std::make_pair(bytes.size() / 2, "a damaged chunk")}) {
     writeFile(file_, half + std::string(zeros, '\0'));
@@ -138,13 +138,13 @@ TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
     EXPECT_THAT(damage, AllOf(StartsWith(file_.string() + ": byte "), HasSubstr(expected),
                               HasSubstr("`mcap recover`")));
     EXPECT_EQ(recording.poses_damage, damage);
-    // The messages of a chunk come in the order of their times.
+    // The messages of a chunk are in time order.
     EXPECT_NEAR(static_cast<double>(read.size()), 2e3 * static_cast<double>(recording.poses.size()),
                 2e3);
     EXPECT_TRUE(std::equal(read.begin(), read.end(), events_.begin()));
     EXPECT_EQ(errorOf([&] { readPoses(file_, {}); }), damage) << "by --poses";
   }
-  // Within the first chunk, nothing is known of any topic.
+  // Within the first chunk, no topic is known yet.
   EXPECT_THAT(errorOfBytes(bytes.substr(0, 5'000)), HasSubstr("which may be cut off"));
 }
 
@@ -153,7 +153,7 @@ TEST_F(Mcap, DamageAmongThePosesIsToldAfterAllEvents) {
   const auto writer = openMcapWriter(file_, rig_);
   writer->addEvents(0, events_);
   for (std::int64_t i = 0; i < 20'000; ++i) {
-    writer->addPose({kFirstNs + i * 100'000, T_world_rig_});  // chunks of their own
+    writer->addPose({kFirstNs + i * 100'000, T_world_rig_});  // the poses fill chunks of their own
   }
   writer->close();
   std::string bytes = readText(file_);
@@ -223,7 +223,7 @@ TEST_F(Mcap, DamagedDataHaveAnotherChecksum) {
   }
 }
 
-// Else a short file could claim the same chunk any number of times.
+// Without this check, a short file could contain the same chunk any number of times.
 TEST_F(Mcap, ChunksThatOverlapAreRefused) {
   write(2'000);
   std::string bytes = readText(file_);
@@ -233,18 +233,18 @@ TEST_F(Mcap, ChunksThatOverlapAreRefused) {
     std::memcpy(&size, &bytes[chunk + 1], sizeof size);
     chunk += kMcapRecordHead + size;
   }
-  // The chunk's index begins with the same two times; then come its offset and its size.
+  // The chunk's index begins with the chunk's two times. Its offset and its size follow.
   const std::size_t index = bytes.rfind(bytes.substr(chunk + kMcapRecordHead, 16));
   std::memcpy(&size, &bytes[index + 24], sizeof size);
-  size *= 2;  // records of another kind lie between chunks
+  size *= 2;  // doubled, because other records lie between chunks
   std::memcpy(&bytes[index + 24], &size, sizeof size);
-  std::fill_n(bytes.end() - 12, 4, '\0');  // no checksum
+  std::fill_n(bytes.end() - 12, 4, '\0');  // removes the checksum
   EXPECT_THAT(errorOfBytes(bytes),
               StartsWith(fmt::format("{}: byte {}: a chunk of {} bytes: expected its end before",
                                      file_.string(), chunk, size)));
 }
 
-// `McapBag` reads only some of it. (The schemas' texts are those of the file.)
+// Checks all records: `McapBag` reads only some. (The schemas' texts are taken from the file.)
 TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   RigCamera unknown;
   unknown.model.width = unknown.model.height = 65'535;
@@ -264,7 +264,7 @@ TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   const std::string names[] = {"/pose", "/cam0/events", "/cam0/camera_info", "/cam1/events",
                                "/cam1/camera_info"};
   struct Message {
-    std::size_t channel;  // 1 is the first
+    std::size_t channel;  // 1 is the first channel
     std::uint64_t t_ns;
     std::string data;
   };
@@ -279,7 +279,7 @@ TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   info.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1, 500, 0, 320.5, 0, 0, 501, 240.5, 0, 0, 0, 1, 0});
   for (int i = 0; i < 6; ++i) info.u32(0);
   messages.push_back({3, kT, info.u8(0).bytes()});
-  for (std::uint64_t i = 0; i < 6; ++i) {  // 320 kB each
+  for (std::uint64_t i = 0; i < 6; ++i) {  // 320 kB per packet
     const bool second = i == 3;
     writer->addEvents(second ? 1 : 0, packet);
     RosMessage message(RosBytes::kCdr);
@@ -306,7 +306,7 @@ TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   std::map<std::size_t, std::size_t> counts;
   for (std::size_t next = 0; next < messages.size(); ++chunks) {
     std::string chunk;
-    std::map<std::size_t, std::string> positions;  // by channel
+    std::map<std::size_t, std::string> positions;  // per channel
     std::uint64_t first_ns = kEndOfTimeNs;
     std::uint64_t last_ns = 0;
     for (; next < messages.size() && chunk.size() < 1 << 20; ++next) {

@@ -15,7 +15,7 @@ namespace efm {
 
 enum class RosBytes { kRos1, kCdr, kCdrBigEndian };
 
-/// Writes the fields of a message one after the other.
+/// Writes the fields of a message one after another.
 class RosMessage {
  public:
   explicit RosMessage(RosBytes kind) : kind_(kind) {
@@ -70,7 +70,7 @@ class RosMessage {
   std::string bytes_;
 };
 
-/// dvs_msgs/EventArray of a sensor of 346x260 pixels.
+/// Returns a dvs_msgs/EventArray of a sensor of 346x260 pixels.
 inline std::string eventArray(RosBytes kind, const std::vector<Event>& events) {
   RosMessage message(kind);
   message.header(events.empty() ? 0 : events.front().t_ns).u32(260).u32(346).u32(events.size());
@@ -80,7 +80,7 @@ inline std::string eventArray(RosBytes kind, const std::vector<Event>& events) {
   return message.bytes();
 }
 
-/// event_camera_msgs/EventPacket.
+/// Returns an event_camera_msgs/EventPacket.
 inline std::string eventPacket(RosBytes kind, std::int64_t stamp_ns, std::uint64_t sequence,
                                const std::string& encoding, const std::string& data,
                                std::uint64_t time_base = 0) {
@@ -105,7 +105,7 @@ inline std::string monoWords(const std::vector<Event>& events, std::int64_t base
   return bytes;
 }
 
-/// @param base_ns the µs after it have 31 bits, and begin again.
+/// @param base_ns start of the times. The µs after it have 31 bits, and then start again at 0.
 inline std::string libcaerWords(const std::vector<Event>& events, std::int64_t base_ns) {
   std::string bytes;
   for (const Event& event : events) {
@@ -116,7 +116,7 @@ inline std::string libcaerWords(const std::vector<Event>& events, std::int64_t b
   return bytes;
 }
 
-/// The words of time, column and row of each event.
+/// Returns the words of time, column and row of each event.
 inline std::string libcaerCmpWords(const std::vector<Event>& events, std::int64_t base_ns) {
   std::string bytes;
   for (const Event& event : events) {

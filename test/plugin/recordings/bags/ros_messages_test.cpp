@@ -31,11 +31,11 @@ BagMessage messageOf(const std::string& bytes, RosBytes kind) {
           kind != RosBytes::kRos1};
 }
 
-/// Calls `decode` for all lengths of a message below its own. Each is an error.
+/// Calls `decode` for every shorter length of a message. Each call must throw.
 template <typename Decode>
 void cutEverywhere(const std::string& bytes, RosBytes kind, const Decode& decode) {
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    const std::string cut = bytes.substr(0, size);  // of its own, for the sanitizer
+    const std::string cut = bytes.substr(0, size);  // a separate copy, for the sanitizer
     EXPECT_NE(errorOf([&] { decode(messageOf(cut, kind)); }), "no error") << size;
   }
 }
@@ -74,10 +74,10 @@ TEST(RosMessages, PacketsHaveTheirFieldsAndMonoEventsTheirExactTimes) {
 }
 
 constexpr std::int64_t kBaseNs = 1'700'000'000'123'456'789;
-constexpr std::int64_t kBaseUsNs = 1'700'000'000'123'456'000;  // libcaer_cmp has whole µs
+constexpr std::int64_t kBaseUsNs = 1'700'000'000'123'456'000;  // libcaer_cmp stores whole µs
 constexpr std::int64_t kUsNs = 1'000;
 
-/// The events of a packet, and the error that ends it.
+/// Returns the error that ends the decoding of a packet. `events` has the events before it.
 std::string decoded(const std::string& encoding, const std::string& data, std::uint64_t time_base,
                     std::vector<Event>& events) {
   const std::string bytes = eventPacket(RosBytes::kCdr, 17, 0, encoding, data, time_base);
@@ -85,7 +85,7 @@ std::string decoded(const std::string& encoding, const std::string& data, std::u
   return errorOf([&] { decode(decodeEventPacket(messageOf(bytes, RosBytes::kCdr)), events); });
 }
 
-// Words as the encodings' definition has them, by hand.
+// The words are written by hand from the definition of the encodings.
 TEST(RosMessages, LibcaerWordsAreDecodedUpToAWrongOne) {
   const auto libcaer = [](std::initializer_list<std::pair<std::uint32_t, std::int32_t>> words) {
     std::string bytes;
@@ -105,7 +105,7 @@ TEST(RosMessages, LibcaerWordsAreDecodedUpToAWrongOne) {
   const auto cmp_at = from(kBaseUsNs);
   constexpr std::int32_t kLastUs = 0x7fff'ffff;
   constexpr std::int64_t kWrapUs = std::int64_t{1} << 31;
-  const std::string whole = libcaer({{0x0006'000b, 5}});  // x 3, y 2, on, valid
+  const std::string whole = libcaer({{0x0006'000b, 5}});  // x 3, y 2, polarity on, valid
   struct Case {
     const char* encoding;
     std::string data;
@@ -116,8 +116,8 @@ TEST(RosMessages, LibcaerWordsAreDecodedUpToAWrongOne) {
            {"libcaer",
             libcaer({{0xffff'fffe, 7}, {0xfffe'0000, 7}, {0x0001'fffc, 8}, {0x0000'0003, 6}}),
             {at(7, 32'767, 32'767, true), at(7, 32'767, 0, false), at(8, 0, 32'767, false),
-             at(6, 0, 0, true)}},  // a microsecond late
-           // The time wraps, a second time, too.
+             at(6, 0, 0, true)}},  // 1 µs late
+           // The time wraps twice.
            {"libcaer",
             libcaer({{0x0002'0004, kLastUs}, {0x0004'0008, 0}, {0, kLastUs}, {0, 3}}),
             {at(kLastUs, 1, 1, false), at(kWrapUs, 2, 2, false), at(kWrapUs + kLastUs, 0, 0, false),
@@ -134,7 +134,7 @@ TEST(RosMessages, LibcaerWordsAreDecodedUpToAWrongOne) {
             evt3Words({0x3805, 0x1fff, 0x3006, 0x0fff, 0x27ff, 0x3fff, 0x1001, 0x3000}),
             {cmp_at(0, 0, 5, true), cmp_at(0xfff, 0, 6, false), cmp_at(0xff'ffff, 2047, 2047, true),
              cmp_at(0xff'f001, 2047, 0, false)}},
-           // A vector without a row begins at row 0, off; the next one 8 rows below.
+           // A vector without a row is in row 0 with polarity off. The next is 8 rows below.
            {"libcaer_cmp",
             evt3Words(
                 {0x2009, 0x5081, 0x5f01, 0x3803, 0x5004, 0x4864, 0x2003, 0x5003, 0x5000, 0x5080}),
@@ -168,7 +168,7 @@ TEST(RosMessages, ATimeBaseOrTimeBeyondTheEndOfTimeIsAnError) {
   EXPECT_THAT(decoded("libcaer_cmp", "", end, events), HasSubstr("time_base = "));
 }
 
-// Else damage would give events of rows that do exist.
+// Rows must not wrap: damaged data would then give events in valid rows.
 TEST(RosMessages, RowsOfVectorsDoNotBeginAgain) {
   std::vector<Event> events;
   std::string data = evt3Words({0x47ff});
@@ -185,7 +185,7 @@ TEST(RosMessages, PosesComeFromAllTypes) {
   struct Case {
     const char* name;
     bool child_frame;
-    int more;  // numbers behind the pose
+    int more;  // numbers after the pose
   };
   for (const Case& each : {Case{"geometry_msgs/PoseStamped", false, 0},
                            Case{"geometry_msgs/PoseWithCovarianceStamped", false, 36},

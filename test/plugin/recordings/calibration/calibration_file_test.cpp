@@ -75,7 +75,7 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
                 EndsWith("given.txt: camera 1 has 240x180 pixels: expected " + size +
                          " pixels, as the recording has"));
   }
-  recorded.cameras[1].model.width = recorded.cameras[1].model.height = 65'535;  // not known
+  recorded.cameras[1].model.width = recorded.cameras[1].model.height = 65'535;  // unknown size
   EXPECT_NO_THROW(calibration.requireLike(recorded));
   recorded.cameras.pop_back();
   EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }),
@@ -128,7 +128,7 @@ TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
   right.distortion = DistortionModel::kEquidistant;
   right.coefficients = {0.1, 0.2, 0.3, 0.4};
   EXPECT_EQ(rig.cameras[1].model, right);
-  // MRPT's own pose of the right camera carries its point to the left one.
+  // MRPT's own pose of the right camera maps its point to the left camera.
   const Eigen::Vector3d p_rig = rig.cameras[1].T_rig_cam * Eigen::Vector3d(1, 2, 3);
   Eigen::Vector3d expected;
   mrpt::poses::CPose3D(mrpt::poses::CPose3DQuat(stereo.rightCameraPose))
@@ -140,7 +140,7 @@ TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
   EXPECT_EQ(one.cameras[0].model, left);
 }
 
-/// TUM-VIE's, without the two frame cameras' values.
+/// TUM-VIE's calibration, without the values of the two frame cameras.
 constexpr const char* kTumVie = R"({"value0": {
 "resolution": [[1, 2], [3, 4], [64, 48], [65, 49]],
 "intrinsics": [{}, {},
@@ -223,7 +223,7 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
 
 }  // namespace
 
-// The calibration files of real data sets, and those of config/ for them.
+// Calibration files of real data sets, and the files for them in config/.
 
 namespace {
 
@@ -292,8 +292,8 @@ TEST_F(DatasetCalibration, EqualsTheCameraChainBesideIt) {
 TEST_F(DatasetCalibration, DsecsHandEyeTransformTurnsLidarPosesIntoPosesOfTheLeftEventCamera) {
   const Calibration calibration = readCalibration(kDsec / "cam_to_cam.yaml");
   const Rigid3 T_lidar_rig = readHandEye(kDsec / "cam_to_lidar.yaml", &calibration);
-  // The 101st message of the LiDAR's odometry, and the same pose of the left event camera as the
-  // paper's authors have it.
+  // The 101st message of the LiDAR's odometry, and the same pose of the left event camera from the
+  // paper's authors.
   const Rigid3 T_world_lidar = {Eigen::Quaterniond(0.9166968464851379, -0.021439503878355026,
                                                    0.016320353373885155, -0.39867401123046875)
                                     .normalized(),
@@ -332,7 +332,7 @@ class HandEyeFile : public TemporaryFolder {
 };
 
 TEST_F(HandEyeFile, GivesTheTransformFromTheRigToTheBody) {
-  // The rig looks along the body's x: its z is the body's x.
+  // The rig looks along the body's x axis: the rig's z axis is the body's x axis.
   const Rigid3 T_body_rig = read(
       "# a car\nT_body_rig:\n- [0, 0, 1, 0.4]\n- [-1, 0, 0, 0.2]\n- [0, -1, 0, -0.1]\n"
       "- [0, 0, 0, 1]\nnote: other keys do not matter\n");
@@ -357,7 +357,7 @@ TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {
-  // T_cam_imu carries the IMU's point (5, 6, 7) to (-6, 5, 7) + (1, 2, 3).
+  // T_cam_imu maps the IMU's point (5, 6, 7) to (-6, 5, 7) + (1, 2, 3).
   const Rigid3 T_imu_rig =
       read("cam0: {T_cam_imu: [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}\n");
   EXPECT_LT((T_imu_rig * Eigen::Vector3d(-5, 7, 10) - Eigen::Vector3d(5, 6, 7)).norm(), 1e-12);
@@ -372,7 +372,7 @@ TEST_F(HandEyeFile, OfADataSetNeedsItsCalibration) {
   EXPECT_THAT(errorOfText(marker), HasSubstr("camera-calibration*.json"));
   EXPECT_THAT(errorOfText(R"({"value0": {"T_imu_marker": {"px": 0}}})"),
               AllOf(HasSubstr("value0: T_imu_marker: q"), HasSubstr(" is missing")));
-  EXPECT_THAT(errorOfText(replaced(marker, R"("qx": 0)", R"("qx": 0.0458)")),  // length 1.00105
+  EXPECT_THAT(errorOfText(replaced(marker, R"("qx": 0)", R"("qx": 0.0458)")),  // norm 1.00105
               HasSubstr("T_imu_marker: qx qy qz qw of length 1.00105: expected a rotation"));
 }
 

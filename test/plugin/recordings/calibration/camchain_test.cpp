@@ -58,8 +58,8 @@ TEST_F(Camchain, HasEachCamerasModelAndPose) {
   expected = {320, 240, 210, 211, 121, 91, DistortionModel::kNone, {}};
   EXPECT_EQ(rig.cameras[1].model, expected);
   EXPECT_TRUE(isSame(rig.cameras[0].T_rig_cam, Rigid3()));
-  // T_cn_cnm1 carries camera 0's point (1, 2, 3) to (-2, 1, 3) + (0.1, 0.2, 0.3) in camera 1, and
-  // this one to (-1.2, -1.9, 3.3) + (0.1, 0.2, 0.3) in camera 2.
+  // T_cn_cnm1 maps camera 0's point (1, 2, 3) to (-2, 1, 3) + (0.1, 0.2, 0.3) in camera 1, and this
+  // point to (-1.2, -1.9, 3.3) + (0.1, 0.2, 0.3) in camera 2.
   const Eigen::Vector3d p_rig(1, 2, 3);
   const Eigen::Vector3d p_cam1(-1.9, 1.2, 3.3);
   const Eigen::Vector3d p_cam2(-1.1, -1.7, 3.6);

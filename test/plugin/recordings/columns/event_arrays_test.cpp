@@ -37,7 +37,7 @@ class EventArrays : public TemporaryFolder {
   }
 };
 
-/// Events of a camera at today's times, in whole microseconds.
+/// Returns events of a camera at current times, in whole microseconds.
 std::vector<Event> manyEvents() {
   std::mt19937 random(3);
   std::vector<Event> events;
@@ -94,7 +94,7 @@ TEST_F(EventArrays, AllThatNumPyWritesHaveTheEventsOfTheText) {
     const auto later = std::move(openEventArrays({file}, options).cameras.at(0));
     const std::int64_t t_ns = all[40'000].t_ns;
     later->seek(t_ns);
-    // 10 ms before, as events may be so late; an archive cannot seek.
+    // The reader starts 10 ms before, because events may be that late. An archive cannot seek.
     const auto first = std::find_if(all.begin(), all.end(), [&](const Event& event) {
       return file.extension() == ".npz" || event.t_ns >= t_ns - 10'000'000;
     });
@@ -149,7 +149,7 @@ TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
   const struct {
     std::string bytes;
     std::string error;
-    std::size_t events = 0;  // before it
+    std::size_t events = 0;  // number of events before the error
   } rows[] = {
       {npyArray("<f8", "(10,)", ten), ": (10)" + expected},
       {npyArray("<f8", "(13, 3)", ten), ": (13, 3)" + expected},
@@ -226,7 +226,7 @@ class Evimo2 : public TemporaryFolder {
              const std::string& bytes) const {
     writeFile(to / ("dataset_" + name), bytes);
   }
-  /// Three events, at 0.016667, 0.5 and 10.123456 s.
+  /// Writes three events, at 0.016667, 0.5 and 10.123456 s.
   std::filesystem::path writeThree(const std::string& camera) const {
     const std::filesystem::path to = sequence(camera);
     write(to, "events_t.npy", npyArray<float>("<f4", "(3, 1)", {0.016667F, 0.5F, 10.123456F}));
@@ -259,7 +259,7 @@ TEST_F(Evimo2, HasEventsAndTheCamerasCalibration) {
   EXPECT_EQ(parts.calibration.value().camera(0, CameraSize{640, 480}).model, model);
   EXPECT_EQ(parts.cameras[0]->size(), std::nullopt);
   EXPECT_TRUE(parts.poses.empty());
-  // Further files have poses and the sensor's size.
+  // Other files give the poses and the sensor's size.
   writeFile(path / "poses.txt", "0.1 1 2 3 0 0 0 1\n");
   for (const auto& [shape, width, height] :
        {std::tuple("(2, 3)", 3, 2), std::tuple("(65535, 1)", 1, 65'535),
@@ -272,7 +272,7 @@ TEST_F(Evimo2, HasEventsAndTheCamerasCalibration) {
     EXPECT_EQ(more.cameras[0]->size().value_or(CameraSize{0, 0}).width, width) << shape;
     EXPECT_EQ(more.cameras[0]->size().value_or(CameraSize{0, 0}).height, height) << shape;
   }
-  // The Samsung's polarity is the other way around; there is no transform between two cameras.
+  // The Samsung's polarity is inverted. The files have no transform between two cameras.
   RecordingParts two = openEvimo2({writeThree("samsung_mono"), path}, {});
   ASSERT_EQ(two.cameras.size(), 2U);
   EXPECT_FALSE(two.calibration);

@@ -49,7 +49,7 @@ Rig rigOfTwo() {
   return rig;
 }
 
-/// Events at today's times, which doubles resolve to 240 ns, in bursts with gaps of 15 ms.
+/// Returns bursts of events with gaps of 15 ms, at current times: doubles resolve them to 240 ns.
 std::vector<Event> eventsOf(std::uint32_t seed, std::size_t count) {
   std::mt19937 random(seed);
   std::vector<Event> events;
@@ -62,7 +62,7 @@ std::vector<Event> eventsOf(std::uint32_t seed, std::size_t count) {
   return events;
 }
 
-/// A recording in all layouts, which h5py writes once.
+/// A recording in all layouts. h5py writes it once.
 class Hdf5Layouts : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -122,12 +122,12 @@ TEST_F(Hdf5Layouts, DamagedFilesAreReadOrRefused) {
   }
 }
 
-/// Files that a test writes.
+/// Tests with files that the test writes.
 class Hdf5Events : public TemporaryFolder {
  protected:
   fs::path file() const { return folder() / "events.h5"; }
 
-  /// Writes data sets, not compressed.
+  /// Writes data sets without compression.
   class Writing {
    public:
     explicit Writing(const fs::path& file)
@@ -177,10 +177,10 @@ class Hdf5Events : public TemporaryFolder {
     Numbers t = {0, 1'500, 2'500};
     Numbers p = {1, 0, 1};
     std::optional<Numbers> index;
-    Numbers offset;  // a number, if there is one
+    Numbers offset;  // a number, if there is an offset
     hid_t t_type = H5T_STD_I64LE;
   };
-  /// DSEC's layout.
+  /// Writes a file in DSEC's layout.
   void write(const Columns& columns) const {
     Writing writing(file());
     writing.add("events/x", H5T_STD_U32LE, columns.x);
@@ -214,14 +214,14 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
   columns.t = {5'000'000'000'000'000, 0, 0};
   check(columns, place + "[0]: t = '5000000000000000': expected " + kExpectedTime, 0);
-  // Of several wrong ones, the first event's is told; of one event's, that of the first column.
+  // The error is about the first wrong event and its first wrong column.
   columns.t = {0, -5'000'000'000'000'000, 0};
   check(columns, place + "[1]: t = '-5000000000000000': expected " + kExpectedTime, 1);
   columns.p = {-2, 1, 0};
   check(columns, place + "[0]: p = '-2': expected polarity 1, 0 or -1", 0);
   Columns real;
   real.t_type = H5T_IEEE_F32LE;
-  real.t = {0, 16'383, 16'384};  // s
+  real.t = {0, 16'383, 16'384};  // seconds
   check(real, place + "[2]: t = '16384': expected " + kExpectedTime, 2);
   const long long end_us = kEndOfTimeNs / 1'000;
   for (const int sign : {-1, 1}) {
@@ -241,12 +241,12 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
 
 TEST_F(Hdf5Events, ASeekGoesToTheFirstEventOfItsTimeOrOfItsMillisecondInTheIndex) {
   Columns columns;
-  columns.t = {0, 500, 999, 1'000, 1'000, 2'500, 2'500, 4'000};  // us
+  columns.t = {0, 500, 999, 1'000, 1'000, 2'500, 2'500, 4'000};  // µs
   columns.x = columns.y = columns.p = Numbers(8, 1);
   const struct {
     std::optional<Numbers> index;
     Numbers times_ns;
-    std::vector<int> first_events;  // of the times
+    std::vector<int> first_events;  // one per time
   } cases[] = {
       {std::nullopt,
        {-1'000'000, 0, 1, 500'000, 999'000, 999'001, 1'000'000, 1'000'001, 2'500'000, 2'500'001,
@@ -255,7 +255,7 @@ TEST_F(Hdf5Events, ASeekGoesToTheFirstEventOfItsTimeOrOfItsMillisecondInTheIndex
       {Numbers{0, 3, 5, 7, 7},
        {-1'000'000, 999'999, 1'000'000, 1'999'999, 2'000'000, 3'000'000, 4'000'000, 9'000'000},
        {0, 0, 3, 3, 5, 7, 7, 7}},
-      // An index that is too early is used; others are not: the events are searched.
+      // An index that is too early is used. For other wrong indices the events are searched.
       {Numbers{0, 1, 3}, {1'000'000, 1'000'001, 3'000'000}, {1, 1, 3}},
       {Numbers{1, 4, 6}, {0, 500'000, 1'000'000, 2'500'000}, {0, 1, 3, 5}},
       {Numbers{8, 8, 8}, {500'000, 2'500'000, 4'000'000, 4'000'001}, {1, 5, 7, 8}},
@@ -294,7 +294,7 @@ TEST_F(Hdf5Events, RealTimesAreSecondsAndKeepTheDigitsThatTheyHold) {
   } rows[] = {
       {H5T_IEEE_F64LE, {0.000012, 12.345678912}, {12'000, 12'345'678'912}},
       {H5T_IEEE_F64LE, {-0.5, 3e6 + 0.123456789}, {-500'000'000, 3'000'000'123'456'789}},
-      {H5T_IEEE_F64LE,  // doubles have steps of 240 ns there
+      {H5T_IEEE_F64LE,  // steps of 240 ns, the resolution of doubles at these times
        {1.5e9 + 0.000001, 1'500'000'001.123456},
        {1'500'000'000'000'001'000, 1'500'000'001'123'456'000}},
       {H5T_IEEE_F32LE, {0.25, 10.123456}, {250'000'000, 10'123'456'000}},
@@ -349,11 +349,11 @@ TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
               HasSubstr(":/events/ts" + expected));
   EXPECT_THAT(errorOf([&] { first_of("events/t", H5T_IEEE_F64LE, real, {}); }),
               HasSubstr(":/events/t" + expected));
-  for (long long& t_us : whole) t_us += 1'700'000'000'000'000;  // of our years
+  for (long long& t_us : whole) t_us += 1'700'000'000'000'000;  // in the present era
   EXPECT_EQ(first_of("events/ts", H5T_STD_I64LE, whole, {}), 1'700'000'005'000'010'000);
   EXPECT_EQ(openHdf5({file()}, {}).cameras[0]->warnings().at(0).name, "time-unit");
   {
-    Writing writing(file());  // MVSEC's are seconds
+    Writing writing(file());  // MVSEC's times are seconds
     writing.add("davis/left/events", H5T_IEEE_F64LE, std::vector<double>{1, 2, 5, 1, 3, 4, 15, -1},
                 {2, 4});
   }
@@ -362,7 +362,7 @@ TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
 }
 
 TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
-  std::vector<double> matrices;  // turned by 90 degrees around x, at (k, 2, 3)
+  std::vector<double> matrices;  // rotations by 90 degrees around x, at (k, 2, 3)
   for (double k = 0; k < 5; ++k) {
     for (const double number : {1., 0., 0., k, 0., 0., -1., 2., 0., 1., 0., 3., 0., 0., 0., 1.}) {
       matrices.push_back(number);
@@ -406,7 +406,7 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
   EXPECT_EQ(readStream(*openHdf5({file()}, options).cameras.at(0)).at(0).t_ns, 5'000'000)
       << "before that of the name";
   std::string bytes = readBytes(file());
-  bytes.at(bytes.find("time_us") + sizeof("time_us") + 2) = 1;  // the third byte of its offset
+  bytes.at(bytes.find("time_us") + sizeof("time_us") + 2) = 1;  // third byte of time_us's offset
   writeFile(file(), bytes);
   EXPECT_THAT(
       errorOf([&] { openHdf5({file()}, options); }),
@@ -450,7 +450,7 @@ TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
     hid_t type;
     std::vector<double> numbers;
     std::vector<hsize_t> sides{};
-    std::optional<H5Z_filter_t> filter{};  ///< In chunks of three; 0: none.
+    std::optional<H5Z_filter_t> filter{};  ///< If set, chunks of three; 0: no filter.
   };
   const std::vector<double> three = {1, 2, 3};
   const std::vector<double> sixteen(16, 0.5);
@@ -510,7 +510,7 @@ TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
                                "expected a complete HDF5 file");
 }
 
-/// M3ED's calibration of a camera.
+/// Calibration of a camera in M3ED's format.
 struct Calib {
   std::vector<double> resolution = {640, 480};
   std::vector<double> intrinsics = {500, 501, 320, 240};
@@ -609,7 +609,7 @@ TEST_F(Hdf5Events, FilesOfAFolderAreInTheOrderOfTheirCameras) {
   EXPECT_FALSE(looksLikeHdf5(in / "missing"));
 }
 
-/// The writer's folder.
+/// Tests the folder that the writer makes.
 class Hdf5WriterTest : public TemporaryFolder {
  protected:
   fs::path out() const { return folder() / "out"; }
@@ -618,7 +618,7 @@ class Hdf5WriterTest : public TemporaryFolder {
 TEST_F(Hdf5WriterTest, TheFolderIsReadBack) {
   constexpr std::size_t kEvents = 150'000;
   Rig rig = rigOfTwo();
-  rig.cameras.push_back(rig.cameras[1]);  // silent
+  rig.cameras.push_back(rig.cameras[1]);  // a silent camera
   const auto writer = openHdf5Writer(out(), rig);
   for (std::size_t camera = 0; camera < 2; ++camera) {
     const std::vector<Event> events = eventsOf(static_cast<std::uint32_t>(camera), kEvents);

@@ -13,13 +13,13 @@
 
 namespace efm {
 
-/// The number in little-endian bytes.
+/// Returns the number as little-endian bytes.
 template <typename Number>
 std::string bytesOfNumber(Number number) {
   return {reinterpret_cast<const char*>(&number), sizeof number};
 }
 
-/// Writes a zip archive whose files are stored, not compressed, byte by byte.
+/// Writes a zip archive. Its files are stored without compression.
 inline void writeZip(const std::filesystem::path& file,
                      const std::vector<std::pair<std::string, std::string>>& members) {
   std::string bytes;
@@ -51,7 +51,7 @@ inline void writeGzip(const std::filesystem::path& file, const std::string& cont
   gzclose(stream);
 }
 
-/// A NumPy array, format 1.0.
+/// Returns a NumPy array, format 1.0.
 /// @param descr "<f8", or a list of fields.
 /// @param shape "(2, 8)".
 template <typename Number>

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 constexpr std::int64_t kMs = 1'000'000;
 
-/// What a sample is, in short: its label, its time in ms and, of events, how many.
+/// Returns in short: the sample's label, its time in ms and, for a packet, its number of events.
 std::string shortly(const Sample& sample) {
   if (const auto* pose = std::get_if<PoseSample>(&sample)) {
     return pose->source.label + "@" + std::to_string(pose->t_ns / kMs);
@@ -40,7 +40,7 @@ std::vector<std::string> shortly(const std::vector<Sample>& samples) {
   return texts;
 }
 
-/// What comes before the error.
+/// Returns the samples before the error.
 std::vector<std::string> readToError(Recording& recording, std::string& error) {
   std::vector<std::string> given;
   error = errorOf([&] {
@@ -63,8 +63,8 @@ class ListedOthers : public OtherStream {
 
 class JoinedRecordingTest : public TemporaryFolder {
  protected:
-  /// @param texts of each camera's events; camera n stands n metres to the right, its clock is n *
-  /// 100 ns behind.
+  /// @param texts each camera's events. Camera n is n metres to the right; its clock is n * 100 ns
+  /// behind.
   JoinedParts parts(const std::vector<std::string>& texts, std::vector<PoseSample> poses = {}) {
     JoinedParts parts;
     for (std::size_t n = 0; n < texts.size(); ++n) {
@@ -165,7 +165,7 @@ TEST_F(JoinedRecordingTest, AnIntervalHasItsEventsAndOfEachSourceAPoseOnEitherSi
     all.others = std::make_unique<ListedOthers>(others);
     return shortly(readAll(*join(std::move(all), {t0_ns, t1_ns})));
   };
-  // The event of camera 1 is at 18 ms on the clock of the poses, but earlier on its own.
+  // The event of camera 1 is at 18 ms on the poses' clock, but earlier on its own clock.
   EXPECT_THAT(cut(18 * kMs, 40 * kMs),
               ElementsAre("slow@5", "pose@13", "cam0@17:0", "cam1@17:0", "cam1@17:1", "other18",
                           "timeless", "cam0@18:1", "cam1@22:1", "pose@23", "cam0@31:1", "pose@33",
@@ -183,10 +183,10 @@ TEST_F(JoinedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
   for (const Sample& sample : readAll(*recording)) {
     covered.push_back(std::get<EventPacket>(sample).covered_until_ns);
   }
-  EXPECT_THAT(covered, ElementsAre(12 * kMs, 15 * kMs,  // the empty ones
-                                   5000 * kMs,          // cam0, 10 to 20 ms
-                                   kEndOfTimeNs,        // cam1's last
-                                   std::nullopt));      // the recording's last
+  EXPECT_THAT(covered, ElementsAre(12 * kMs, 15 * kMs,  // the empty packets
+                                   5000 * kMs,          // cam0's packet of 10 to 20 ms
+                                   kEndOfTimeNs,        // cam1's last packet
+                                   std::nullopt));      // the recording's last packet
 }
 
 TEST_F(JoinedRecordingTest, ACameraWithoutEventsIsSilentFromTheBeginning) {
@@ -210,7 +210,7 @@ TEST_F(JoinedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
   EXPECT_THAT(error, HasSubstr("cam0/events.txt:3: '0.019 0 0'"));
 }
 
-/// A camera whose file tells what is missing.
+/// A camera whose file reports lost events.
 struct LossyStream : EventStream {
   explicit LossyStream(std::uint64_t packets) : lost(packets) {}
   bool read(std::vector<Event>&) override { return false; }

@@ -21,7 +21,7 @@ constexpr const char* kCamera =
     "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
     "resolution: [346, 260]}\n";
 
-/// Two cameras of 240 x 180 pixels. @param shift_ms of the clock of the second one.
+/// Returns two cameras of 240 x 180 pixels. @param shift_ms clock shift of the second camera.
 std::string twoCamchain(int shift_ms = 0) {
   std::string text;
   for (const char* name : {"cam0", "cam1"}) {
@@ -57,7 +57,7 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
   const struct {
     const char* file;
     std::string bytes;
-    std::string error;  // behind the name
+    std::string error;  // text after the name
   } rows[] = {
       {"e.txt", "0.1 1 2 up\n",
        ":1: '0.1 1 2 up': p = 'up': expected polarity 0 or 1, or -1 or 1, or True or False, or ON "
@@ -101,7 +101,7 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
   EXPECT_THAT(errorOf({folder() / "poses.txt"}), HasSubstr(": poses: expected --poses "));
 }
 
-/// The size of the first camera, and the number of poses and of warnings.
+/// The size of the first camera, and the numbers of poses and of warnings.
 struct Opened {
   int width = 0;
   int poses = 0;
@@ -147,7 +147,7 @@ TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid)
   EXPECT_THAT(
       errorOfSource(source),
       HasSubstr("no poses: expected groundtruth.txt (not clear: second.txt, tracker.csv), or"));
-  // Names that the layout knows come first, without a word.
+  // File names that the layout knows have priority, without a message.
   write("groundtruth.txt", "0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n");
   const Opened known = openedOf(source);
   EXPECT_EQ(known.poses, 2);
@@ -162,7 +162,7 @@ TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
   source.reader.sensor_size = CameraSize{320, 240};
   source.complete = false;
   EXPECT_EQ(openedOf(source).width, 320);
-  source.calibration = folder() / "calib.txt";  // without a size
+  source.calibration = folder() / "calib.txt";  // a file without a size
   EXPECT_EQ(openedOf(source).width, 320);
   write("e.txt", "640 480\n0.1 300 2 0\n0.2 1 2 1\n");
   EXPECT_EQ(errorOfSource(source),
@@ -170,7 +170,7 @@ TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
 }
 
 TEST_F(OpenRecording, AnIntervalIsOnTheClockOfThePoses) {
-  std::string events;  // one each ms
+  std::string events;  // one event per ms
   for (int i = 1000; i < 2000; ++i) {
     events += "1." + std::to_string(i).substr(1) + " " + std::to_string(i % 240) + " 1 0\n";
   }
@@ -180,7 +180,7 @@ TEST_F(OpenRecording, AnIntervalIsOnTheClockOfThePoses) {
   struct Case {
     int own_ms;
     std::optional<int> given_ms;
-    int first_ms;  // of camera 1, whose times are the poses' minus the offset
+    int first_ms;  // event of camera 1, whose times are the poses' times minus the offset
     int end_ms;
   };
   for (const auto& [own_ms, given_ms, first_ms, end_ms] : {Case{0, {}, 400, 600},

@@ -17,8 +17,8 @@ using testing::StartsWith;
 
 class PoseFile : public TemporaryFolder {
  protected:
-  /// Two poses: at t0 and t1, at (1, 2, 3) and (4, 5, 6), turned by (0.5, 0.5, 0.5, 0.5) and
-  /// (0.8, 0, 0, 0.6), x y z w.
+  /// Expects two poses: at t0 and t1, at (1, 2, 3) and (4, 5, 6), rotated by (0.5, 0.5, 0.5, 0.5)
+  /// and (0.8, 0, 0, 0.6), x y z w.
   static void expectTwo(const std::vector<StampedPose>& poses, std::int64_t t0_ns,
                         std::int64_t t1_ns, const std::string& what) {
     ASSERT_EQ(poses.size(), 2U) << what;
@@ -99,7 +99,7 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
   ReaderOptions options;
   options.time_unit = "us";
   EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000);
-  // The first 100 are looked at, and all are read.
+  // The unit is found from the first 100 poses; all poses are read.
   for (const int count : {99, 100}) {
     lines.clear();
     for (int i = 0; i < count; ++i) lines += std::to_string(928'218 + i) + " 1 2 3 0 0 0 1\n";
@@ -108,7 +108,7 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
     EXPECT_THAT(error, HasSubstr(count == 99 ? "no error" : "all times are whole"));
   }
   EXPECT_EQ(readPoses(folder() / "long.txt", options).size(), 40'100U);
-  // Decimals are seconds: the option is that of the events. Compressed text is text.
+  // Decimals are seconds: the option is for the events. Compressed text is read as text.
   writeGzip(folder() / "poses.txt.gz", kTum);
   writeZip(folder() / "poses.zip", {{"a/poses.txt", kTum}});
   for (const auto& file :
@@ -290,7 +290,7 @@ TEST_F(UnreadFormats, AreNamedWithinCompressedFiles) {
 }
 
 TEST_F(UnreadFormats, OthersHaveNoName) {
-  // A rawlog's first object, an unknown file, and text that mentions a magic.
+  // A rawlog's first object, an unknown file, and text that contains a magic word.
   for (const std::string& bytes :
        {"\x93"s + "CObservationRobotPose", "\x01\x02\x03"s, "see <html>"s, " ftypmp42"s}) {
     EXPECT_EQ(nameOf(bytes), "");
@@ -311,7 +311,7 @@ TEST_F(UnreadFormats, AFolderIsNamedByTheFilesInIt) {
   EXPECT_THAT(folder_of("0.mcap", "\x89MCAP0\r\n"),
               StartsWith("a folder: give its files themselves (0.mcap is a ROS 2 bag"));
   EXPECT_EQ(folder_of("readme", "words"), "");
-  for (const char* name : {"m.png", "b.png", "a", "aa", "ab", "ac", "h.png"}) {  // the first known
+  for (const char* name : {"m.png", "b.png", "a", "aa", "ab", "ac", "h.png"}) {  // the first file
     writeFile(folder() / "in" / name, name[0] == 'a' ? "words" : "\x89PNG\r\n\x1a\n");
   }
   EXPECT_THAT(unreadFormat(folder() / "in").value_or(""),

@@ -55,15 +55,15 @@ std::string eventPacket(const std::vector<Aedat4Event>& events) {
   return finished(builder, builder.EndTable(table), "EVTS");
 }
 
-/// The same FlatBuffer with all its values `skip` bytes later, as a writer that aligns otherwise.
+/// Returns the same FlatBuffer with all values `skip` bytes later, as another writer aligns them.
 std::string shifted(std::string bytes, std::uint32_t skip) {
   std::uint32_t number = 0;
-  for (const std::size_t at : {std::size_t{0}, sizeof(number)}) {  // the size, the root's position
+  for (const std::size_t at : {std::size_t{0}, sizeof(number)}) {  // size, root's position
     std::memcpy(&number, &bytes[at], sizeof(number));
     number += skip;
     std::memcpy(&bytes[at], &number, sizeof(number));
   }
-  return bytes.insert(12, skip, '\0');  // behind the identifier
+  return bytes.insert(12, skip, '\0');  // after the identifier
 }
 
 struct PacketInfo {
@@ -100,7 +100,7 @@ std::string indexOf(const std::vector<Entry>& entries) {
 std::string headerOf(Packing compression, std::int64_t index, const std::string& xml,
                      std::uint32_t skip = 0) {
   flatbuffers::FlatBufferBuilder builder;
-  builder.ForceDefaults(true);  // so that its size is the same for every index
+  builder.ForceDefaults(true);  // so the file's size is the same for every index
   const auto info = builder.CreateString(xml);
   const auto table = builder.StartTable();
   builder.AddElement(4, static_cast<std::int32_t>(compression), 0);
@@ -124,8 +124,8 @@ std::string outInfo(const std::string& streams) {
          streams + "</node></dv>";
 }
 
-/// Streams 0 and 3 have events, the others another kind of data. The list in the file is not in
-/// order.
+/// Returns a recording. Streams 0 and 3 have events, other streams have other data. The list in the
+/// file is not in order.
 const std::string& twoCameras() {
   static const std::string xml = outInfo(
       streamXml(3, "EVTS", "right") + streamXml(1, "IMUS", "left") + streamXml(2, "FRME", "left") +
@@ -133,7 +133,7 @@ const std::string& twoCameras() {
   return xml;
 }
 
-/// Packet k of a stream has 100 events in [k, k + 1) ms.
+/// Returns packet k of a stream: 100 events in [k, k + 1) ms.
 std::vector<Event> packetEvents(int stream, int packet) {
   std::vector<Event> events;
   for (int i = 0; i < 100; ++i) {
@@ -226,7 +226,7 @@ TEST_F(Aedat4, EachPositionInAFlatBufferIsChecked) {
   ASSERT_EQ(good.size() % 4, 0U);
   const std::string header = headerOf(Packing::kNone, -1, outInfo(streamXml(0, "EVTS", "left")));
   std::size_t refused = 0;
-  // Every number of it, once beyond the end and once before the beginning.
+  // Makes each number of the buffer point beyond the end and before the beginning.
   for (std::size_t at = 0; at + 4 <= good.size(); at += 2) {
     for (const std::uint32_t wrong : {0x7fff'fff0U, 0xffff'fff0U, 0x8000'0000U}) {
       std::string damaged = good;
@@ -275,7 +275,7 @@ TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
     parts.cameras[1]->seek(t_us * 1000);
     EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, packet)) << t_us;
   }
-  // With an index that does not fit, all is read.
+  // If the index does not fit, all packets are read.
   std::string damaged = recording(Packing::kZstd, true);
   damaged[damaged.size() - 100] ^= 1;
   writeFile(file(), damaged);

@@ -33,10 +33,10 @@ std::vector<std::int64_t> timesOf(const std::vector<Event>& events) {
 
 TEST(EvtDecoder, Evt2HasAnEventInAWord) {
   std::string bytes;
-  for (const std::uint32_t word : {0x0000'0000U,  // before the time
-                                   0x8000'0002U,  // 128 µs
+  for (const std::uint32_t word : {0x0000'0000U,  // before the first time
+                                   0x8000'0002U,  // time 128 µs
                                    0x1000'0000U | 3U << 22U | 639U << 11U | 479U,
-                                   0xa000'0001U,  // a trigger
+                                   0xa000'0001U,  // a trigger event
                                    0x0000'0000U | 63U << 22U | 2047U << 11U | 2047U}) {
     putWord(bytes, word);
   }
@@ -48,7 +48,7 @@ TEST(EvtDecoder, Evt2HasAnEventInAWord) {
 
 TEST(EvtDecoder, Evt21HasAVectorInAWordAndTwoOrdersOfItsHalves) {
   const std::vector<std::uint32_t> words = {
-      // upper and lower halves
+      // pairs of the upper and the lower half
       0x8000'0001U, 0U, 0x1000'0000U | 5U << 22U | 32U << 11U | 7U, 0x8000'0005U,
       0xe000'0000U, 1U, 0x0000'0000U | 6U << 22U | 64U << 11U | 8U, 0x0000'0002U};
   std::string legacy;
@@ -68,11 +68,11 @@ TEST(EvtDecoder, Evt21HasAVectorInAWordAndTwoOrdersOfItsHalves) {
 TEST(EvtDecoder, Evt3HasAChangeInAWord) {
   EvtDecoder decoder(EvtEncoding::kEvt3);
   EXPECT_THAT(
-      decoded(decoder, evt3Words({0x2001, 0x8001, 0x2001, 0x6004, 0x2001,  // before the row
+      decoded(decoder, evt3Words({0x2001, 0x8001, 0x2001, 0x6004, 0x2001,  // before the first row
                                   0x0805,                                  // row 5, second camera
                                   0x2a7f, 0x207f,                          // single events
-                                  0x3864, 0x4801, 0x50ff, 0x4002,          // vectors from 100 on
-                                  0xa001, 0xe123, 0x7001, 0xf001, 0x1001, 0x9001,  // skipped
+                                  0x3864, 0x4801, 0x50ff, 0x4002,          // vectors from x = 100
+                                  0xa001, 0xe123, 0x7001, 0xf001, 0x1001, 0x9001,  // skipped words
                                   0x0006, 0x2001})),
       ElementsAre(Event{4'100'000, 639, 5, true}, Event{4'100'000, 127, 5, false},
                   Event{4'100'000, 100, 5, true}, Event{4'100'000, 111, 5, true},
@@ -84,8 +84,8 @@ TEST(EvtDecoder, Evt3HasAChangeInAWord) {
   EXPECT_EQ(decoder.undatedEvents(), 3U);
 }
 
-// A decoder that counts the wraps of TIME_LOW, adds a step of TIME_HIGH to them, or sets the lower
-// bits to 0 at a TIME_HIGH is wrong by 4096 µs in one of these.
+// A decoder is wrong by 4096 µs in one of these cases if it counts the wraps of TIME_LOW, adds a
+// step of TIME_HIGH to the wraps, or sets the lower bits to 0 at a TIME_HIGH.
 TEST(EvtDecoder, Evt3TimeFollowsBothRegistersAndALateTimeHigh) {
   constexpr unsigned kEvent = 0x2000;
   struct Case {
@@ -162,7 +162,7 @@ TEST(EvtDecoder, Evt2TimeWrapsAndMayStepBack) {
       ElementsAre(kWrap - 64, kWrap, kWrap - 16 * 64, kWrap + 64, kWrap + 0x600'0000 * 64LL));
 }
 
-/// Events of a sensor of 2048x2048 pixels: rows with several events, pauses of up to 10 s.
+/// Returns events of a sensor of 2048x2048 pixels: rows with several events, pauses of up to 10 s.
 std::vector<Event> randomEvents() {
   std::vector<Event> events;
   std::int64_t t_us = *rc::gen::inRange<std::int64_t>(0, 16'000'000);

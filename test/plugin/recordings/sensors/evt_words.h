@@ -25,7 +25,7 @@ inline std::string evt3Words(const std::vector<unsigned>& words) {
   return bytes;
 }
 
-/// The number of events from `first` on that a vector of `pixels` columns can hold together.
+/// Returns the number of events from `first` on that fit into one vector of `pixels` columns.
 inline std::size_t vectorLength(const std::vector<Event>& events, std::size_t first,
                                 unsigned pixels) {
   const Event& base = events[first];
@@ -48,7 +48,7 @@ inline std::uint32_t vectorBits(const std::vector<Event>& events, std::size_t fi
   return bits;
 }
 
-/// Encodes events with times in whole µs, in their order, as the format's description says.
+/// Encodes events in their order, as the format's description says. Their times are whole µs.
 inline std::string evtBytes(EvtEncoding encoding, const std::vector<Event>& events) {
   std::string bytes;
   std::int64_t high = -1;  // the last TIME_HIGH

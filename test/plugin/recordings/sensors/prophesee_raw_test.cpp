@@ -38,7 +38,7 @@ const std::vector<RawKind>& rawKinds() {
   return all;
 }
 
-/// 70 s, with rows of several events and silences of up to 9 s: the clock of EVT 3.0 wraps.
+/// Returns 70 s of rows of several events, with pauses of up to 9 s. The clock of EVT 3.0 wraps.
 std::vector<Event> longRecording() {
   std::mt19937 random(1);
   std::vector<Event> events;
@@ -66,7 +66,7 @@ class PropheseeRaw : public TemporaryFolder {
 TEST_F(PropheseeRaw, WithoutGeometryTheSizeIsThatOfTheCamera) {
   struct Case {
     std::string lines;
-    int width;  // 0: not known
+    int width;  // 0 if not known
     int height;
   };
   for (const Case& each : std::vector<Case>{
@@ -134,7 +134,7 @@ TEST_F(PropheseeRaw, EventsBeforeTheFirstTimeAreCountedUnlessTheyLieBeforeTheSou
 
 TEST_F(PropheseeRaw, ThePositionOfAnEventIsThatOfItsWord) {
   const std::string header = "% evt 3.0\n";
-  // The fourth word has one event, the sixth two.
+  // The fourth word has one event, the sixth word two events.
   writeFile(file(), header + evt3Words({0x8001, 0x6000, 0x0005, 0x2001, 0x3000, 0x4003}));
   const auto stream = streamOf(file());
   std::vector<Event> events;
@@ -214,8 +214,8 @@ TEST_F(PropheseeRaw, ARealEvt2RecordingHasTheEventsThatNumPyFinds) {
   const auto stream = streamOf(real);
   EXPECT_EQ(stream->size().value_or(CameraSize{}).height, 480) << "a camera of generation 3";
   const std::vector<Event> events = readStream(*stream);
-  // Counted with numpy.frombuffer(…, '<u4') behind the 166 bytes of the header: words of type 0 and
-  // 1; the time is 64 times the last word of type 8 before them, plus the bits 22 to 27.
+  // Counted with numpy.frombuffer(…, '<u4') after the header's 166 bytes: words of type 0 and 1.
+  // The time is 64 times the previous word of type 8, plus the bits 22 to 27.
   ASSERT_EQ(events.size(), 521'252U);
   std::int64_t on = 0;
   std::int64_t sum_us = 0;

@@ -28,7 +28,7 @@ using testing::IsEmpty;
 
 constexpr std::int64_t kMs = 1'000'000;
 
-/// Blocks of events behind which the data are damaged.
+/// A stream of given blocks. The data after the blocks are damaged.
 class ListedStream : public EventStream {
  public:
   using Blocks = std::vector<std::vector<Event>>;
@@ -66,7 +66,7 @@ TEST(EventPackets, AnIntervalIsReadAsFarAsLateEventsOfItMayCome) {
   for (const bool whole : {true, false}) {
     std::int64_t sought_ns = 0;
     ListedStream::Blocks blocks = {{{kBegin - 1}, {kBegin}}, {{kEnd}, {last}}, {{kEnd - 1}}};
-    if (whole) blocks.push_back({{last + 1}, {-kMs}});  // what follows is not looked at
+    if (whole) blocks.push_back({{last + 1}, {-kMs}});  // events after `last` are not read
     EventPackets packets(std::make_unique<ListedStream>(blocks, sought_ns), {1, 1});
     packets.startAt(kBegin);
     packets.stopAt(kEnd);
@@ -112,7 +112,7 @@ TEST(EventPackets, AnEventBesideTheSensorOrBeyondTheEndOfTimeIsAnError) {
     Event event;
     const char* error;
   } rows[] = {
-      {{0, 299, 7, true}, "damaged"},  // good
+      {{0, 299, 7, true}, "damaged"},  // a valid event
       {{0, 300, 7, true},
        "block 1, event 1: x = '300': expected a whole number from 0 to 299 (the sensor "
        "has 300x8 pixels; are x and y in this order"},
@@ -166,7 +166,7 @@ TEST(EventPackets, MoreThanFourEventsAPixelAtOneTimeAreAnErrorOfAllTimes) {
   }
 }
 
-/// Blocks of one event each, up to the end of the file.
+/// A stream of given blocks. The file ends after the blocks.
 class EndingStream : public ListedStream {
  public:
   using ListedStream::ListedStream;
@@ -190,9 +190,9 @@ TEST(EventPackets, AnEventFarAheadOfBothNeighboursIsTheBadOne) {
   } rows[] = {
       {{0, 1, 100'000, 2, 3}, {0, 1, 2, 3}},
       {{0, 1, 100'000, 2}, {0, 1, 2}, 50},
-      {{0, 1, 100'000}, {0, 1}},                    // the last one
-      {{0, 1, 100'000}, {0, 1}, 50, nullptr},       // is not of the interval
-      {{0, 1, 9'000}, {0, 1, 9'000}, {}, nullptr},  // may be noise after a pause
+      {{0, 1, 100'000}, {0, 1}},                    // the last event is bad
+      {{0, 1, 100'000}, {0, 1}, 50, nullptr},       // the last event is outside the interval
+      {{0, 1, 9'000}, {0, 1, 9'000}, {}, nullptr},  // the last event may be noise after a pause
       {{0, 1, 1'001, 2}, {0, 1, 1'001}, {}, "at most 10 ms before the newest (1.001000000)"},
       {{0, 1, 1'002, 2}, {0, 1, 2}},
       {{0, 1, 5'000, 4'990, 5'001}, {0, 1, 4'990, 5'000, 5'001}, {}, nullptr},  // a pause
@@ -223,9 +223,9 @@ TEST(EventPackets, AnEventFarAheadOfBothNeighboursIsTheBadOne) {
 class PacketsOfText : public TemporaryFolder {};
 
 TEST_F(PacketsOfText, AnIntervalHasItsEventsInOrderThoughTheyComeLate) {
-  constexpr int kEvents = 100'000;  // one each 10 us: several blocks of text
+  constexpr int kEvents = 100'000;  // one event per 10 µs: several blocks of text
   std::mt19937 random(1);
-  std::vector<std::pair<std::int64_t, int>> order;  // of arrival, up to 9.9 ms late
+  std::vector<std::pair<std::int64_t, int>> order;  // order of arrival, up to 9.9 ms late
   for (int i = 0; i < kEvents; ++i) {
     order.emplace_back(i * 10'000 + static_cast<std::int64_t>(random() % (99 * kMs / 10)), i);
   }
@@ -279,11 +279,11 @@ TEST_F(PacketsOfText, BadEventsAreLeftOutUpToTheLimitOfAllCameras) {
       AllOf(HasSubstr("cam0.txt:3: "), HasSubstr("(--skip-bad-events N leaves out up to N")));
 }
 
-/// Times from `first` on; a negative step: they fall.
+/// Returns `count` times from `first` on. A negative step gives falling times.
 TimeSample sampleOf(int count, double first, double step) {
   TimeSample sample;
   for (int i = 0; i < count; ++i) sample.add(first + i * step);
-  sample.add(NAN);  // is left out
+  sample.add(NAN);  // ignored
   return sample;
 }
 
@@ -297,7 +297,7 @@ TEST(TimeUnit, IsThatOfTheOptionOrOfTheValuesWhereTheyLeaveNoDoubt) {
     double first;
     double step;
     int exponent;
-    const char* error;  // null: none
+    const char* error;  // null if there is no error
     bool warned = false;
   } rows[] = {
       {0, 0, 0, 0, nullptr},
@@ -305,12 +305,12 @@ TEST(TimeUnit, IsThatOfTheOptionOrOfTheValuesWhereTheyLeaveNoDoubt) {
       {10, 5, 10, 0,
        "in e: all times are whole numbers, of an unknown unit: probably us, where 10"},
       {2000, 25'000, -10, 0, "probably us, where 2000 events take 0.02 s: expected --time-unit us"},
-      {2000, 5, 100, 0, "probably us"},  // of the usual units the one in the middle
+      {2000, 5, 100, 0, "probably us"},  // of the possible common units the middle one
       {2000, 5, 10'000, 0, "probably ns"},
       {2000, 5, 1'000'000'000, 0, none},
       {20, 5, 0, 0, none},
       {2000, 1.7e15, 10, -6, nullptr, true},
-      {2000, 1.7e12, 1, 0, "all times are whole numbers"},  // of our years, but too rare
+      {2000, 1.7e12, 1, 0, "all times are whole numbers"},  // in the present era, but too rare
       {2000, kYear2000Us - 19'990, 10, -6, nullptr, true},
       {2000, kYear2000Us - 20'000, 10, 0, "all times are whole numbers"},
       {2000, kYear2050Us - 20'000, 10, -6, nullptr, true},
@@ -320,7 +320,7 @@ TEST(TimeUnit, IsThatOfTheOptionOrOfTheValuesWhereTheyLeaveNoDoubt) {
       {2000, -1.7e18, 1e4, -9, nullptr},
       {2000, 0.5, 1e-5, 0, nullptr},
       {2000, 0.5, 0, 0, nullptr},
-      {1000, 0.5, 33.28 / 999, 0, nullptr},  // 30 events in a second
+      {1000, 0.5, 33.28 / 999, 0, nullptr},  // 30 events per second
       {1000, 0.5, 33.32 / 999, 0,
        "in e: 1000 events from 0.5 on take 33.3 of a unit that is not seconds: probably ms"},
       {999, 0.5, 1.0 / 29, 0, nullptr},

@@ -17,7 +17,7 @@
 
 namespace efm {
 
-/// All events of a stream.
+/// Returns all events of a stream.
 inline std::vector<Event> readStream(EventStream& stream) {
   std::vector<Event> events;
   std::vector<Event> block;
@@ -25,7 +25,7 @@ inline std::vector<Event> readStream(EventStream& stream) {
   return events;
 }
 
-/// The events of all packets.
+/// Returns the events of all packets.
 inline std::vector<Event> readPackets(EventPackets& packets) {
   std::vector<Event> events;
   for (auto packet = packets.nextPacket(); !packet.empty(); packet = packets.nextPacket()) {
@@ -34,8 +34,8 @@ inline std::vector<Event> readPackets(EventPackets& packets) {
   return events;
 }
 
-/// Reads damaged copies of a file: cut at many positions, and with flipped bits. Each is read to
-/// its end, or refused by an error that begins with the name of the file.
+/// Reads damaged copies of a file: cut at many positions, and with flipped bits. Each copy is read
+/// to its end, or rejected with an error that begins with the name of the file.
 inline void readDamaged(const std::string& bytes, const std::filesystem::path& file,
                         const std::string& format_name) {
   const RecordingFormat* format = nullptr;
@@ -56,7 +56,7 @@ inline void readDamaged(const std::string& bytes, const std::filesystem::path& f
   for (int i = 0; i < 60; ++i) {
     read(bytes.substr(0, i < 20 ? static_cast<std::size_t>(i) : random() % bytes.size()));
     std::string flipped = bytes;
-    // The beginning has the lengths and the types.
+    // The beginning of the file has the lengths and the types.
     const std::size_t range = i % 2 == 0 ? std::min<std::size_t>(bytes.size(), 600) : bytes.size();
     for (int flips = 1 + i % 4; flips > 0; --flips) {
       flipped[random() % range] ^= static_cast<char>(1U << random() % 8);

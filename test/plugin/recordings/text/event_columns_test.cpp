@@ -18,7 +18,7 @@
 namespace efm {
 namespace {
 
-/// The values of event i: of its time, its column, its row and its polarity.
+/// A function of the event's number i: its time, column, row or polarity.
 using Values = std::function<double(int)>;
 struct Recorded {
   Values t = [](int i) { return 1 + i * 1e-5; };
@@ -27,10 +27,10 @@ struct Recorded {
   Values p = [](int i) { return i % 3 == 0 ? 1 : 0; };
 };
 
-/// What the values of events with the columns x y t p show: "xytp!" if it is certain.
+/// Returns the order that values in the columns x y t p show: "xytp!" if the order is certain.
 std::string shownBy(const Recorded& recorded, int count = 200,
                     const std::string& expected = "txyp") {
-  EventRows rows = {{1, 2, 3}};  // not four numbers
+  EventRows rows = {{1, 2, 3}};  // a row without four numbers
   for (int i = 0; i < count; ++i) {
     rows.push_back({recorded.x(i), recorded.y(i), recorded.t(i), recorded.p(i)});
   }
@@ -55,11 +55,11 @@ TEST(ColumnOrder, IsThatOfTheOnlyPossibleColumns) {
   EXPECT_EQ(shownBy(with(&Recorded::p, [](int i) { return -(i % 2); })), "");
   EXPECT_EQ(shownBy(with(&Recorded::p, [](int i) { return i % 3; })), "");
   EXPECT_EQ(shownBy(with(&Recorded::p, [](int i) { return 0.5 * (i % 3); })), "");
-  // A late time is a tenth of all before the newest at most.
+  // A time may be late by a tenth of the whole duration at most.
   EXPECT_EQ(shownBy(with(&Recorded::t, [](int i) { return i == 101 ? 90 : i; }), 102), "xytp!");
   EXPECT_EQ(shownBy(with(&Recorded::t, [](int i) { return i == 101 ? 89 : i; }), 102), "");
   EXPECT_EQ(shownBy(with(&Recorded::t, [](int) { return 0.5; })), "");
-  // Pixels are whole, at least 0, have 16 bits, and differ by 2 at least.
+  // Pixels are whole, at least 0, have 16 bits, and span 2 or more.
   for (const auto& column : {&Recorded::x, &Recorded::y}) {
     for (const auto& [least, most, order] :
          {std::tuple(0.0, 65'535.0, "xytp!"), std::tuple(3.0, 5.0, "xytp!"),
@@ -75,11 +75,11 @@ TEST(ColumnOrder, IsTheExpectedOneWhereItIsPossible) {
   for (const char* expected : {"xytp", "yxtp"}) {
     EXPECT_EQ(shownBy({}, 10, expected), std::string(expected) + "!");
   }
-  Recorded still;  // with one pixel, one polarity and one time
+  Recorded still;  // one pixel, one polarity, one time
   still.t = still.x = still.y = [](int) { return 7; };
   still.p = [](int) { return 1; };
   EXPECT_EQ(shownBy(still, 200, "xytp"), "xytp!");
-  Recorded restarted;  // with decimals, a time may fall
+  Recorded restarted;  // times with decimals may fall
   restarted.t = [](int i) { return i % 100 + 0.5; };
   EXPECT_EQ(shownBy(restarted, 200, "xytp"), "xytp!");
   restarted.t = [](int i) { return i % 100; };
@@ -89,7 +89,7 @@ TEST(ColumnOrder, IsTheExpectedOneWhereItIsPossible) {
 
 }  // namespace
 
-// Text events of other layouts than t x y p.
+// Tests text events in other layouts than t x y p.
 
 namespace {
 
@@ -158,7 +158,7 @@ TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
   EXPECT_EQ(sized.size()->height, 180);
 }
 
-/// Events as a sensor makes them, in any order and unit.
+/// Returns events as a sensor makes them, in any order and unit.
 /// @param format of a line with the fields {t}, {x}, {y} and {p}.
 /// @param start and step of the times, in the unit.
 std::string linesOf(const std::string& format, int count, double start, double step, int decimals) {
@@ -188,7 +188,7 @@ TEST_F(EventColumnsText, TheOrderThatTheValuesShowIsUsedAndSaid) {
       HasSubstr("e.txt: by their values, the columns are probably x y p t: expected t x y"));
   EXPECT_THAT(errorOfText(usual, ReaderOptions{{}, "x y t p", {}}),
               AllOf(HasSubstr("--event-columns 'x y t p'"), HasSubstr("e.txt are t x y p by")));
-  EventTextStream swapped(write(usual), ReaderOptions{{}, "t y x p", {}});  // may be so
+  EventTextStream swapped(write(usual), ReaderOptions{{}, "t y x p", {}});  // possible
   EXPECT_EQ(readStream(swapped).at(1).y, events.at(1).x);
   EventTextStream named(write("a,b,c,d\n" + linesOf("{t},{x},{y},{p}", 200, 1, 1e-5, 6)));
   ASSERT_THAT(named.warnings(), testing::SizeIs(1));
@@ -268,7 +268,7 @@ TEST_F(EventColumnsText, CompressedTextHasTheEventsOfTheText) {
 }
 
 TEST_F(EventColumnsText, SeekingLeavesOutNothingAndReadsLittle) {
-  std::string text = manyLines(200'000);  // 0.4 s in 4 MB, every second one late
+  std::string text = manyLines(200'000);  // 0.4 s in 4 MB; every second event is late
   text += "# the end\n4.999900000 1 1 0\n5.000100000 2 2 0\n4.995 3 3 0\n5.0002 4 4 0\n";
   const std::filesystem::path file = write(text);
   EventTextStream whole(file);

@@ -15,7 +15,7 @@
 
 namespace efm {
 
-// Where GoogleTest looks for it.
+// GoogleTest looks for this operator in the namespace of Event.
 static std::ostream& operator<<(std::ostream& stream, const Event& event) {
   return stream << formatSeconds(event.t_ns) << " " << event.x << " " << event.y << " "
                 << event.polarity;
@@ -43,7 +43,7 @@ class EventText : public TemporaryFolder {
   std::string errorOfText(const std::string& text) const {
     return errorOf([&] { read(text); });
   }
-  /// What an error about a line begins with.
+  /// Returns the beginning of an error about a line.
   std::string line(int number) const { return file().string() + ":" + std::to_string(number); }
 };
 
@@ -116,7 +116,7 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
 
 TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
   std::vector<Event> events;
-  for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s; disorder that is sorted, too
+  for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s of events; their disorder is sorted
     const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
     events.push_back({(i - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240), 7, true});
   }
@@ -147,7 +147,7 @@ TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
                     testing::Not(HasSubstr("\x1b"))));
 }
 
-/// For properties, which are no fixtures.
+/// Returns a file for properties, which have no fixture.
 std::filesystem::path propertyFile() {
   return std::filesystem::temp_directory_path() /
          ("efm_event_text_" + std::to_string(getpid()) + ".txt");
