@@ -49,7 +49,7 @@ std::vector<Warning> warningsOf(const SyntheticRecording& recording,
   return warningsOf(Findings{statisticsOf(recording, options), {}});
 }
 
-/// Turns pose i by `rate` radians per second.
+/// Rotates pose i by `rate` radians per second.
 void rotate(SyntheticRecording& recording, double rate) {
   double angle = 0;
   for (StampedPose& pose : recording.poses) {
@@ -63,20 +63,20 @@ void turnAtRest(SyntheticRecording& recording, double rate) {
   rotate(recording, rate);
 }
 
-/// Two seconds; some 2,000 events of each camera.
+/// Returns two seconds with about 2,000 events per camera.
 SyntheticRecording soundRecording() {
   static const SyntheticRecording recording(2.0);
   return recording;
 }
 
-/// Each as "name: text".
+/// Returns each warning as "name: text".
 std::vector<std::string> linesOf(const std::vector<Warning>& warnings) {
   std::vector<std::string> lines;
   for (const Warning& warning : warnings) lines.push_back(warning.name + ": " + warning.text);
   return lines;
 }
 
-/// One warning that begins so, or for an empty text none.
+/// Expects one warning that starts with `begin`, or no warning if `begin` is empty.
 void expectWarning(const std::vector<Warning>& warnings, const std::string& begin,
                    const std::string& what) {
   if (begin.empty()) {
@@ -146,7 +146,7 @@ TEST(HealthChecks, OtherUnitsOfTimeAreGuessed) {
     for (const bool of_events : {true, false}) {
       SyntheticRecording recording(0.5);
       const auto change = [&](std::int64_t& t_ns, bool in_unit) {
-        t_ns -= 9'990'000'000;  // so that no unit leaves the range of times
+        t_ns -= 9'990'000'000;  // so no unit exceeds the range of times
         if (in_unit) t_ns = std::llround(factor * static_cast<double>(t_ns));
       };
       for (auto& events : recording.events) {
@@ -171,7 +171,7 @@ std::vector<Warning> cameraWarnings(const RecordingStatistics& statistics) {
   return warnings;
 }
 
-/// The warnings of cameras that have no events.
+/// Returns the warnings about cameras that have no events.
 std::vector<Warning> warningsOf(const std::vector<RigCamera>& cameras) {
   RecordingStatistics statistics;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
@@ -182,7 +182,7 @@ std::vector<Warning> warningsOf(const std::vector<RigCamera>& cameras) {
 
 TEST(HealthChecks, CamerasHaveLimits) {
   struct Row {
-    std::function<void(RigCamera&)> change;  // of camera 1 of three
+    std::function<void(RigCamera&)> change;  // change of camera 1 of three
     const char* expected;
   };
   const auto distort = [](RigCamera& camera, DistortionModel model, double k1) {
@@ -215,7 +215,7 @@ TEST(HealthChecks, CamerasHaveLimits) {
       {[](auto& c) { c.model.fx = 5.2; },
        "focal-length: camera 1: a focal length of 5.2 px and 120 columns are "
        "a field of view of 170 degrees"},
-      {[&](auto& c) {  // whose corners have rays
+      {[&](auto& c) {  // a camera whose corners have rays
          c.model = {120, 40, 40, 40, 59.5, 20, DistortionModel::kNone, {}};
          distort(c, DistortionModel::kEquidistant, 0);
        },
@@ -246,8 +246,8 @@ TEST(HealthChecks, CamerasHaveLimits) {
 
 TEST(HealthChecks, ActivityOfCamerasIsCompared) {
   struct Row {
-    std::vector<std::size_t> events;  // of each camera
-    std::size_t positive;             // of camera 2
+    std::vector<std::size_t> events;  // per camera
+    std::size_t positive;             // number of positive events of camera 2
     const char* expected;
   };
   const Row rows[] = {
@@ -270,7 +270,7 @@ TEST(HealthChecks, ActivityOfCamerasIsCompared) {
       std::vector<Event> events;
       for (std::size_t i = 0; i < row.events[c]; ++i) {
         const bool positive = c == 2 ? i < row.positive : i % 2 == 0;
-        const std::size_t pixel = 7 * i + c;  // others of each camera, all over it
+        const std::size_t pixel = 7 * i + c;  // each camera has other pixels, all over the sensor
         events.push_back({static_cast<std::int64_t>(i), static_cast<std::uint16_t>(pixel % 120),
                           static_cast<std::uint16_t>(pixel / 120 % 90), positive});
       }
@@ -297,7 +297,7 @@ TEST(RecordingStatistics, CountsByTheTimesOfEventsAndPoses) {
   };
   add_events(0, {10, 20, 30});
   add_pose(wheels, 20);
-  add_events(1, {12, 100});  // 5 later by their offset
+  add_events(1, {12, 100});  // 5 ns later because of the time offset
   EXPECT_EQ(statistics.eventsBeforePoses(), 2U);
   EXPECT_EQ(statistics.eventsAfterPoses(), 2U);
   add_pose(tracker, 60);
@@ -322,7 +322,7 @@ TEST(RecordingStatistics, CountsByTheTimesOfEventsAndPoses) {
 TEST(RecordingStatistics, SpeedsAreThoseOverTenMilliseconds) {
   PoseStatistics poses;
   const double x_m[] = {0, 0.01, 0.5, 0.02, 0.05, 0.06};
-  const std::int64_t t_ms[] = {0, 10, 15, 20, 30, 29};  // 15: jitter; 29: too late
+  const std::int64_t t_ms[] = {0, 10, 15, 20, 30, 29};  // 15 is jitter; 29 is too late
   for (int i = 0; i < 6; ++i) {
     Rigid3 T_world_rig{rotationBy({0, 0, 2 * x_m[i]}), {0, x_m[i], 0}};
     poses.add({t_ms[i] * 1'000'000, T_world_rig}, 20'000'000);
@@ -361,7 +361,7 @@ TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
   EXPECT_EQ(namesOf(warningsOf(Findings{statistics, {}, kMaxTimeNs, 100, 200})),
             Names{"no-motion"});
 
-  recording = soundRecording();  // the poses of a run that was stopped after a second
+  recording = soundRecording();  // like the poses of a run that was stopped after one second
   recording.poses.resize(recording.poses.size() / 2);
   EXPECT_EQ(namesOf(warningsOf(recording)), Names{"clock-overlap"});
   const RecordingStatistics half = statisticsOf(recording);
@@ -384,11 +384,11 @@ TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
   }
 }
 
-/// A camera of 120x90 pixels, and events in a rectangle of them.
+/// A camera of 120x90 pixels with events in rectangles.
 struct Sensor {
   std::vector<std::uint16_t> counts = std::vector<std::uint16_t>(120 * 90, 0);
 
-  /// @param columns, rows: the first and the one after the last.
+  /// Adds events in a rectangle. @param columns, rows the first one and the end (excluded).
   Sensor& fill(std::pair<int, int> columns, std::pair<int, int> rows, double share = 0.5,
                std::uint16_t events = 3) {
     std::mt19937 random(1);
@@ -418,9 +418,9 @@ TEST(HealthChecks, EventsThatOccupyAPartOfTheSensorAreSeen) {
   struct Row {
     const char* what;
     Sensor sensor;
-    const char* area;  // in the warning; empty: none
+    const char* area;  // text in the warning; empty: no warning
   };
-  Sensor fading;  // a scene that ends within the motion of its image
+  Sensor fading;  // the scene fades out within the motion of its image
   for (int x = 0; x < 120; ++x) fading.fill({x, x + 1}, all_rows, std::min(1.0, 0.02 * x));
   const std::vector<Row> rows = {
       {"all", Sensor().fill(all_columns, all_rows), ""},
@@ -456,7 +456,7 @@ TEST(HealthChecks, EventsThatOccupyAPartOfTheSensorAreSeen) {
 }
 
 TEST(HealthChecks, DepthsAtALimitAreSeen) {
-  DepthPlanesOptions planes;  // 0.5 to 5 m: 2 and 0.2 in inverse depth
+  DepthPlanesOptions planes;  // 0.5 to 5 m: inverse depths of 2 to 0.2 per metre
   std::vector<ChosenOption> chosen;
   const auto warningsAt = [&](float depth_m, int percent, int depths = 500) {
     cv::Mat_<float> depth(20, 50, 0.0F);
@@ -488,7 +488,7 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
 
 TEST(HealthChecks, DepthsThatRestOnLittleEvidenceAreDoubted) {
   DepthPlanesOptions planes;
-  /// A wall at 2 m, seen from x = 0.1 m farther each time.
+  /// Returns the doubts about a wall at 2 m, seen from 0.1 m farther along x each time.
   const auto doubtsOf = [&](double second_m, double parallax_px_m, std::uint64_t at_farthest) {
     DepthStatistics statistics(planes);
     for (const double depth_m : {2.0, second_m, 2.0}) {
@@ -590,7 +590,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
       {live([](auto&) {}), ""},
       {live([](auto& s) {
          QueueCounts& camera = s.live->cameras[1];
-         camera.held = 40;  // like queued and paused events, these are not lost
+         camera.held = 40;  // like queued and paused events, held events are not lost
          camera.queued = 20;
          camera.lost = 10;
          camera.fates[EventFate::kPaused] = 80;
@@ -627,7 +627,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     row.make(status, options);
     expectWarning(warnings_of(status, options), row.expected, row.expected);
   }
-  SessionStatus none = sound;  // without a keyframe its error says why
+  SessionStatus none = sound;  // if there is no keyframe, the error says why
   none.counts.keyframes = 0;
   none.counts.cameras[0][EventFate::kWithoutPose] = none.counts.windows_without_events = 60;
   none.counts.keyframes_without_pose = 1;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::int64_t kIntervalNs = 10'000'000;
 
-/// Events of camera 0, at these times; x tells them apart.
+/// Returns events of camera 0 at the given times. Each has another x.
 std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
   std::vector<Event> events;
   for (const std::int64_t t_ns : times_ns) {
@@ -23,7 +23,7 @@ std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
   return events;
 }
 
-/// Passes events in packets that end at these indices, each covered until its last event.
+/// Passes packets that end before the indices `ends`, complete until their last event if `covered`.
 std::vector<Event> passed(EventBudget& budget, const std::vector<Event>& events,
                           std::vector<std::size_t> ends, bool covered) {
   std::vector<Event> result;
@@ -80,7 +80,7 @@ TEST(EventBudget, AStepOfTheClockBackHoldsNothingForGood) {
 
 TEST(EventBudget, LateEventsCountForTheCurrent10Ms) {
   std::vector<std::int64_t> times_ns;
-  for (std::int64_t i = 0; i < 60; ++i) {  // twenty of each 10 ms, and as many from 20 ms before
+  for (std::int64_t i = 0; i < 60; ++i) {  // 20 events per 10 ms, and 20 that are 20 ms late
     times_ns.push_back((100 + i / 20) * kIntervalNs + i % 20);
     times_ns.push_back(times_ns.back() - 2 * kIntervalNs);
   }
@@ -96,7 +96,7 @@ TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
   EXPECT_EQ(*covered_ns, kIntervalNs);
 }
 
-/// @param t_ns of the last event; the first one is earlier.
+/// @param t_ns time of the last event; the first event is earlier.
 EventPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
   RigCamera calibration;
   calibration.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
@@ -166,7 +166,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
       const bool all_mapped = camera > 0;
       const InputQueue::Batch batch = queue.take(all_mapped);
       RC_ASSERT(batch.poses.size() == std::exchange(poses, 0));
-      bool may_skip = all_mapped;  // skipped packets come first, and end the batch
+      bool may_skip = all_mapped;  // skipped packets come first and end the batch
       for (const EventPacket& taken : batch.packets) {
         const Waiting next = waiting.front();
         waiting.pop_front();
@@ -198,7 +198,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   }
 }
 
-/// A stream with pauses, in any packets. Some events, and poses, are followed by one far ahead.
+/// A stream with pauses in random packets. A time far ahead follows some events and poses.
 RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   LiveOptions options;
   options.max_event_rate = *rc::gen::element(0.0, 1e9);
@@ -220,10 +220,10 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
     if (ahead) add(expected.back() + 100'000'000'000);
     wrong += ahead ? 1 : 0;
     if (!ends_packet) continue;
-    next.covered_until_ns = next.events.back().t_ns;  // of one far ahead, too
+    next.covered_until_ns = next.events.back().t_ns;  // may be far ahead, too
     queue.add(std::exchange(next, packet(0, 0, 0)));
   }
-  for (int i = 0; i < 2; ++i) {  // the last ones are confirmed, too
+  for (int i = 0; i < 2; ++i) {  // so the last times are confirmed, too
     expected.push_back(expected.back() + 1);
     add(expected.back());
   }
@@ -251,7 +251,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   queue.add(packet(0, 5, 30));
   EXPECT_EQ(queue.counts().at(0).held, 30U);
   queue.end();
-  queue.add(packet(0, 6, 30));  // too late
+  queue.add(packet(0, 6, 30));  // an event that is too late
   const InputQueue::Batch batch = queue.wait();
   EXPECT_TRUE(batch.ended);
   ASSERT_EQ(batch.packets.size(), 2U);

@@ -27,7 +27,7 @@ NoisyPose poseOf(std::int64_t t_ms, double x_m, double turn_deg = 0, PoseNoise n
   return pose;
 }
 
-/// The limits are 10 m/s and 100 degrees/s, and five standard deviations of the stated noise.
+/// The limits are 10 m/s and 100 degrees/s plus five standard deviations of the stated noise.
 TEST(LiveGuard, HoldsThePosesAfterAMotionThatNothingExplains) {
   struct Row {
     NoisyPose next;  // 0.1 s after a pose at the origin
@@ -43,8 +43,8 @@ TEST(LiveGuard, HoldsThePosesAfterAMotionThatNothingExplains) {
       {poseOf(100, 0, -10.1), true},
       {poseOf(100, 0, 10.1, {0, 0.001}), false},
       {poseOf(200, 1.9, 19), false},
-      {poseOf(0, 5), false},    // a second pose of a time is the mapper's business
-      {poseOf(-50, 5), false},  // and so is an earlier one
+      {poseOf(0, 5), false},    // the mapper handles a second pose of the same time
+      {poseOf(-50, 5), false},  // and an earlier pose
   };
   for (const Row& row : rows) {
     LiveGuard guard = liveGuard();
@@ -68,30 +68,30 @@ TEST(LiveGuard, HoldsThePosesAfterAMotionThatNothingExplains) {
   }
 }
 
-/// A mapper with the recording's poses and its events of the first half second.
+/// Returns a mapper with the recording's poses and with its events of the first half second.
 FusionMapper mapperOf(const SyntheticRecording& recording) {
   FusionMapper mapper(syntheticOptions().mapper);
   for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
   for (const StampedPose& pose : recording.poses) mapper.addPose(pose);
   for (int c = 0; c < 2; ++c) mapper.addEvents(c, pieceOf(recording, c, 0, 0.5).events);
-  mapper.nextWindow();  // its windows begin at the first event
+  mapper.nextWindow();  // the windows begin at the first event
   return mapper;
 }
 
 TEST(LiveGuard, DropsTheWindowsThatNeedMissingEventsInBothModes) {
   SyntheticRecording recording(1);
   recording.cameras[1].time_offset_ns =
-      -100 * kMillisecond;  // its clock is ahead of that of the poses
+      -100 * kMillisecond;  // the camera's clock is ahead of the poses' clock
   const std::int64_t start_ns = SyntheticRecording::kStartNs;
   constexpr DropReason kPaused = DropReason::kPaused;
   enum class Call { kNext, kOverdue, kAll };
   struct Row {
     const char* what;
     int camera;
-    std::int64_t until_ms;  // on the camera's clock, after the start
+    std::int64_t until_ms;  // on the camera's clock, since the start
     Call call;
     std::int64_t at_ms;
-    std::uint64_t windows;  // of 0.2 s every 0.1 s, dropped
+    std::uint64_t windows;  // number of dropped windows of 0.2 s every 0.1 s
   };
   const Row rows[] = {
       {"until the camera's next data", 0, 400, Call::kNext, 250, 3},
@@ -108,7 +108,7 @@ TEST(LiveGuard, DropsTheWindowsThatNeedMissingEventsInBothModes) {
       FusionMapper mapper = mapperOf(recording);
       guard.noteMissing(row.camera, {start_ns + row.until_ms * kMillisecond, kPaused});
       const std::int64_t at_ns = start_ns + row.at_ms * kMillisecond;
-      for (int twice = 0; twice < 2; ++twice) {  // it is done once
+      for (int twice = 0; twice < 2; ++twice) {  // the second call must change nothing
         if (row.call == Call::kNext) guard.dropMissing(mapper, row.camera, at_ns);
         if (row.call == Call::kOverdue) guard.dropOverdue(mapper, at_ns);
         if (row.call == Call::kAll) guard.dropAllMissing(mapper);
@@ -142,7 +142,7 @@ TEST(LiveGuard, WindowsAreDroppedWhosePosesAreOverdue) {
   const SyntheticRecording recording(1);
   const std::int64_t last_ns = recording.poses.back().t_ns;
   struct Row {
-    std::int64_t events_until_ms;  // after the last pose; max_pose_wait_s is 2
+    std::int64_t events_until_ms;  // since the last pose; max_pose_wait_s is 2
     bool live;
     bool drops;
   };

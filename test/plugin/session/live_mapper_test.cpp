@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The mapper in live operation. Wrong or too much input takes nothing else with it, and everything
-// is counted.
+// Tests the mapper in live operation: wrong or excessive input costs no other data, and all is
+// counted.
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
@@ -58,7 +58,7 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
   EXPECT_EQ(status.live->errors, 0U) << status.live->last_error;
 }
 
-/// Stops the mapper, or destroys it, while its thread maps and callbacks use it.
+/// The mapper is stopped, or destroyed, while its thread maps and callbacks use it.
 TEST(LiveMapper, StopWaitsForTheCallbackAndFinishReturnsAfterIt) {
   const Samples samples = announced(SyntheticRecording(1.5));
   for (const bool finishes : {false, true}) {
@@ -105,7 +105,7 @@ TEST(LiveMapper, AHostMayDropItsLastReferenceInEachCallback) {
     }
   };
   SyntheticRecording recording;
-  recording.events[1].resize(1);  // the log warns of its silence
+  recording.events[1].resize(1);  // the log warns about the silent camera
   const Samples samples = announced(recording);
   for (const std::string name : {"keyframe", "map", "log"}) {
     const auto host = std::make_shared<Host>();
@@ -131,7 +131,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   const SyntheticRecording recording(2);
   const Samples samples = samplesOf(recording);
   EventFusionOptions options = live();
-  options.live.max_queue_events = 2500;  // more than a window, less than the recording
+  options.live.max_queue_events = 2500;  // more than one window, less than the recording
   std::atomic<bool> is_stopped{false};
   std::promise<void> go_on;
   Mapper::Callbacks callbacks;
@@ -145,7 +145,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   ASSERT_LT(i, samples.size());
-  for (; i < samples.size(); ++i) mapper.add(samples[i]);  // the mapping stands still
+  for (; i < samples.size(); ++i) mapper.add(samples[i]);  // while the mapping is blocked
   EXPECT_GE(mapper.numKeyframes(), 1U);
   EXPECT_FALSE(mapper.points()->empty());
   const SessionStatus before = mapper.status();
@@ -191,7 +191,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   for (const StampedPose& pose : recording.poses) session.addPose(sampleOf(pose, wheels));
   addEvents(session, recording);
   EXPECT_EQ(mapRest(session).size(), 11U);
-  // The pose at 1 s before the start was the last that came alone.
+  // Poses wait 600 s. The last pose without events was at 1 s before the start.
   EXPECT_EQ(session.status().poses->first_ns, at(-601).t_ns);
 }
 
@@ -269,7 +269,7 @@ TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnEr
 TEST(LiveMapper, LossesAreLoggedWithNumbersAndLatePosesAreCounted) {
   const SyntheticRecording recording;
   EventFusionOptions options = live();
-  options.live.max_event_rate = 1000;  // 10 in 10 ms
+  options.live.max_event_rate = 1000;  // 10 events in 10 ms
   MapperLog log;
   Mapper mapper(options, log.callbacks());
   EventPacket packet{1, recording.cameras[1], {}, std::nullopt};
@@ -318,7 +318,7 @@ TEST(LiveMapper, EventsThatWaitForPosesAreBoundedInNumberAndMemory) {
   }
 }
 
-/// Each sample may be late, wrong or lost, whatever the schedule of the mapper's thread.
+/// Each sample may be late, wrong or lost, with any schedule of the mapper's thread.
 RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
   static const Samples samples = samplesOf(SyntheticRecording(0.7));
   enum { kLate = 1, kOutside, kOtherLens, kOlder, kPaused, kLost, kJump, kTwice, kAhead, kKinds };

@@ -18,7 +18,7 @@
 namespace efm {
 namespace {
 
-/// Keyframes of a shaken recording, as the tracker has them.
+/// Returns keyframes of a shaken recording at the tracker's poses.
 std::vector<KeyframeDepthMap> shakenKeyframes(double duration_s = 1.2) {
   EventFusionOptions options = refinedOptions();
   options.refinement.enabled = false;
@@ -33,7 +33,7 @@ MapRefinementOptions refinementOptions(bool background) {
   return options;
 }
 
-/// Those that were moved, by the refiner alone.
+/// Returns the keyframes that a refiner moves, without MapRefinement.
 std::map<std::size_t, Rigid3> refinedAlone(const std::vector<KeyframeDepthMap>& keyframes) {
   const RefinementOptions options;
   KeyframeRefiner refiner(options);
@@ -55,7 +55,7 @@ TEST_P(MapRefinementInEitherMode, EndsAtTheRefinersPoses) {
   std::map<std::size_t, Rigid3> moved;
   for (const KeyframeDepthMap& keyframe : keyframes) {
     const Rigid3 T_world_ref = refinement.add(keyframe, std::nullopt);
-    if (GetParam()) continue;  // in the background they move at any time
+    if (GetParam()) continue;  // in the background, keyframes move at any time
     for (const auto& [number, T_new] : refinement.takeMoved()) moved[number] = T_new;
     if (moved.empty()) continue;
     EXPECT_TRUE(isSame(T_world_ref, moved.rbegin()->second));
@@ -86,7 +86,7 @@ TEST(CovarianceAt, ARotationMovesTheRigAcrossItsLever) {
   std::uniform_real_distribution<double> number(-1, 1);
   const auto draw = [&] { return Eigen::Vector3d(number(random), number(random), number(random)); };
   for (int i = 0; i < 20; ++i) {
-    // One motion alone: a shift and a small rotation.
+    // One motion only: a shift and a small rotation.
     const Eigen::Vector3d shift = draw();
     const Eigen::Vector3d rotation = draw();
     const Eigen::Vector3d lever = 3 * draw();
@@ -118,11 +118,11 @@ TEST(MapRefinement, DoesNotWaitForTheBackgroundAndMayEndBeforeIt) {
   EXPECT_GT(most_waiting, 0U);
 }
 
-/// A refinement in the background whose memory fails once, while it refines a keyframe.
+/// A refinement in the background. Memory fails once, while a keyframe is refined.
 struct FailingBackground {
   RefinementState state;
   std::map<std::size_t, Rigid3> T_world_ref;
-  std::vector<std::size_t> allocations;  ///< For that keyframe.
+  std::vector<std::size_t> allocations;  ///< Sizes during this keyframe's refinement.
 
   FailingBackground(const std::vector<KeyframeDepthMap>& keyframes, std::size_t skipped) {
     MapRefinementOptions options;
@@ -131,7 +131,7 @@ struct FailingBackground {
     for (std::size_t i = 0; i < keyframes.size(); ++i) {
       if (i == 3) failAllocation(Allocating::kOtherThreads, skipped);
       refinement.add(keyframes[i], std::nullopt);
-      // A keyframe that the refiner could not take waits for the next one.
+      // A keyframe that the refiner could not add waits for the next keyframe.
       while (refinement.state().waiting > refinement.state().failures) std::this_thread::yield();
       if (i == 3) allocations = stopFailing();
     }
@@ -162,7 +162,7 @@ TEST(MapRefinement, AFailureInTheBackgroundIsCountedAndTheNextKeyframeIsRefined)
         << "the first keeps its pose by the tracker";
     EXPECT_EQ(disturbed.state.waiting, 0U);
     EXPECT_GE(disturbed.state.counts.registered + 1, undisturbed.state.counts.registered);
-    if (disturbed.state.failures == 0) continue;  // the standard library sorts with less memory
+    if (disturbed.state.failures == 0) continue;  // sorting also works with less memory
     EXPECT_EQ(disturbed.state.failures, 1U);
     EXPECT_EQ(disturbed.state.last_error, std::bad_alloc().what());
     ++failures;
@@ -173,7 +173,7 @@ TEST(MapRefinement, AFailureInTheBackgroundIsCountedAndTheNextKeyframeIsRefined)
 
 }  // namespace
 
-// A mapping session whose keyframes' poses are refined.
+// Tests a mapping session that refines the keyframes' poses.
 
 namespace {
 
@@ -189,7 +189,7 @@ EventFusionOptions unrefinedOptions() {
   return options;
 }
 
-/// Root mean square distance of keyframes from where they are, after a shift of all.
+/// Returns the root mean square distance of keyframes from the truth, after a common shift.
 double distanceOf(const std::vector<Rigid3>& T_world_ref, const std::vector<Rigid3>& truth) {
   Eigen::Matrix3Xd apart(3, truth.size());
   for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -237,7 +237,7 @@ TEST(Session, MakesTheSameMapFromPacketsOfAnyLength) {
   }
 }
 
-// --- What the tracker says of its noise --------------------------------------------------------
+// --- Stated noise of the tracker ---------------------------------------------------------------
 
 EventFusionOptions noiseOptions() {
   EventFusionOptions options = optionsOf(false);
@@ -249,7 +249,7 @@ EventFusionOptions noiseOptions() {
 
 using Noise = std::optional<PoseNoise>;
 
-/// Maps the shaken recording with all poses that are made of each.
+/// Maps the shaken recording. `add` adds the poses that a test makes of each pose.
 std::unique_ptr<MappingSession> mapWith(
     const EventFusionOptions& options,
     const std::function<void(MappingSession&, const StampedPose&, std::size_t)>& add) {
@@ -295,7 +295,7 @@ TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRefusesDoesNotShiftTheO
   MappingSession session(options);
   for (StampedPose pose : recording.poses) {
     const std::int64_t window = (pose.t_ns - SyntheticRecording::kStartNs) / kShakenWindowNs;
-    if (window == 5) pose.T_world_rig.translation.z() += 1e18;  // voxels have no numbers there
+    if (window == 5) pose.T_world_rig.translation.z() += 1e18;  // here, voxels have no numbers
     const PoseNoise noise{window == 8 ? std::nan("") : 0.01, 0.005};
     session.addPose(sampleOf(pose, {}, noise));
   }

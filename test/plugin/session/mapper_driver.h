@@ -24,7 +24,7 @@ using Samples = std::vector<Sample>;
 
 inline constexpr std::int64_t kMsNs = 1'000'000;
 
-/// Packets of 10 ms of each camera, then the pose at their end.
+/// Returns packets of 10 ms of each camera, then the pose at their end.
 /// @param announced the first packets announce the cameras: the empty packets before a camera's
 /// first event are complete until this event.
 inline Samples samplesOf(const SyntheticRecording& recording, bool announced = false) {
@@ -56,7 +56,7 @@ inline EventFusionOptions live(EventFusionOptions options = syntheticOptions()) 
   return options;
 }
 
-/// Adds a sample when the mapping has taken the sample before. So the queue never overflows, even
+/// Adds a sample when the mapping has taken the previous sample. So the queue never overflows, even
 /// on a slow machine.
 inline void addPatiently(Mapper& mapper, const Samples& samples) {
   const auto waits = [&] {
@@ -82,13 +82,13 @@ inline std::shared_ptr<const MapSnapshot> mapOf(const EventFusionOptions& option
   return mapper.snapshot();
 }
 
-/// The counts of a camera; none if all its packets were rejected, since the rig lacks it then.
+/// Returns a camera's counts. If all its packets were rejected, the rig lacks it: all are 0.
 inline EventCounts countsOf(const SessionStatus& status, int camera) {
   const auto index = static_cast<std::size_t>(camera);
   return index < status.counts.cameras.size() ? status.counts.cameras[index] : EventCounts{};
 }
 
-/// Live operation: each event has one count.
+/// Expects that each event has one count in live operation.
 inline void expectSumsAgree(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     EXPECT_EQ(queue.received, queue.held + queue.queued + queue.taken + queue.fates.total());
@@ -106,7 +106,7 @@ inline std::set<std::int64_t> timesOf(const MapSnapshot& map) {
   return times;
 }
 
-/// The same poses of all keyframes, and the same points, bit for bit.
+/// Expects the same poses of all keyframes and the same points, bit for bit.
 inline void expectSameMap(const MapSnapshot& map, const MapSnapshot& expected) {
   for (const auto trajectory : {&MapSnapshot::trajectory, &MapSnapshot::tracker_trajectory}) {
     const std::vector<StampedPose>& poses = map.*trajectory;
@@ -125,7 +125,7 @@ inline void expectSameMap(const MapSnapshot& map, const MapSnapshot& expected) {
 struct MapperLog {
   std::vector<std::string> lines;
 
-  /// Callbacks that write into this log.
+  /// Returns callbacks that write into this log.
   Mapper::Callbacks callbacks() {
     Mapper::Callbacks callbacks;
     callbacks.warn = callbacks.info = [this](const std::string& line) { lines.push_back(line); };

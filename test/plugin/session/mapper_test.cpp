@@ -26,7 +26,7 @@ class MapperInEitherMode : public testing::TestWithParam<bool> {
 };
 INSTANTIATE_TEST_SUITE_P(Live, MapperInEitherMode, testing::Bool());
 
-/// @return how many samples threw this error.
+/// @return the number of samples that threw `Error`.
 template <typename Error>
 std::size_t addAll(Mapper& mapper, const Samples& samples) {
   std::size_t errors = 0;
@@ -40,8 +40,7 @@ std::size_t addAll(Mapper& mapper, const Samples& samples) {
   return errors;
 }
 
-/// The parts of a map agree: its points are the points of its keyframes at the poses of the
-/// trajectory.
+/// Expects a consistent map: its points are its keyframes' points at the poses of the trajectory.
 void expectConsistent(const MapSnapshot& map, const GlobalCloudOptions& options) {
   ASSERT_EQ(map.trajectory.size(), map.keyframes.size());
   ASSERT_EQ(map.tracker_trajectory.size(), map.keyframes.size());
@@ -58,7 +57,7 @@ void expectConsistent(const MapSnapshot& map, const GlobalCloudOptions& options)
 TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsistent) {
   const Samples samples = samplesOf(shaken(SyntheticRecording(1.3)));
   const EventFusionOptions options = in(refinedOptions());
-  const auto first = mapOf(refinedOptions(), samples);  // playback
+  const auto first = mapOf(refinedOptions(), samples);  // mapped in playback
   const std::size_t count = first->keyframes.size();
   std::shared_ptr<Mapper> mapper;
   std::size_t delivered = 0;
@@ -101,9 +100,9 @@ TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsis
 
 // --- Pause and end -----------------------------------------------------------------------------
 
-/// Whether the mapping keeps up or gets most of the input at once.
+/// Holds if the mapping keeps up, and if it gets most of the input at once.
 TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
-  const Samples samples = samplesOf(SyntheticRecording(3));  // three in 10 ms
+  const Samples samples = samplesOf(SyntheticRecording(3));  // three samples per 10 ms
   for (const bool at_once : {false, isLive()}) {
     std::uint64_t fed = 0;
     std::promise<void> all_fed;
@@ -204,7 +203,7 @@ TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
 
 TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
   SyntheticRecording recording;
-  recording.events[1].clear();  // the log warns of its silence before the first keyframe is given
+  recording.events[1].clear();  // the log warns about it before the first keyframe is given
   const Samples samples = samplesOf(recording);
   const EventFusionOptions options = in(syntheticOptions());
   const auto expected = mapOf(options, samples);
@@ -213,7 +212,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
     MapperLog log;
     std::size_t thrown = 0;
     std::size_t keyframes = 0;
-    const auto madeKeyframes = [&] {  // another thread may ask, too
+    const auto madeKeyframes = [&] {  // another thread may query, too
       const auto ask = [&] { return mapper->status().counts.keyframes; };
       return std::async(std::launch::async, ask).get();
     };
@@ -251,8 +250,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
   }
 }
 
-/// The mapping goes on after an error: in live operation with the next window, in playback with the
-/// same window.
+/// After an error, live operation continues with the next window, playback with the same window.
 TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
   struct FullDisk : DsiSink {
     std::atomic<int> planes{0};
@@ -306,7 +304,7 @@ TEST_P(MapperInEitherMode, IfMemoryEndsKeyframesAndPointsStayConsistent) {
   };
   const Samples samples = announced(SyntheticRecording());
   EventFusionOptions options = in(syntheticOptions());
-  options.mapper.keyframe.sweep.threads = 1;  // the sink is called by the thread that maps
+  options.mapper.keyframe.sweep.threads = 1;  // the mapping thread calls the sink
   const auto run = [&](std::size_t skipped) {
     FailingSink sink;
     sink.skipped = skipped;
@@ -341,11 +339,11 @@ TEST_P(MapperInEitherMode, IfMemoryEndsKeyframesAndPointsStayConsistent) {
 
 // --- Threads -----------------------------------------------------------------------------------
 
-/// Asks the mapper from other threads during the first sweep.
+/// A sink that queries the mapper from other threads during the first sweep.
 struct QueryingSink : DsiSink {
   std::vector<std::function<void()>> queries;
   std::chrono::milliseconds patience{150};
-  std::size_t answered = 0;  ///< During the sweep.
+  std::size_t answered = 0;  ///< Number of queries answered during the sweep.
   std::atomic<bool> has_asked{false};
   std::vector<std::future<void>> answers;
 
@@ -368,7 +366,7 @@ TEST_P(MapperInEitherMode, QueriesAreAnsweredDuringASweepInLiveOperationAlone) {
   if (isLive()) sink.patience = std::chrono::seconds(60);
   mapper.setSink(&sink);
   play(mapper, samplesOf(SyntheticRecording()));
-  sink.answers.clear();  // waits for the threads
+  sink.answers.clear();  // waits for the query threads
   EXPECT_EQ(sink.answered, isLive() ? sink.queries.size() : 0U);
 }
 
@@ -392,7 +390,7 @@ TEST(Mapper, PlaybackMapsInputFromACallbackAfterIt) {
 }
 
 TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
-  // All poses and a packet of each camera come first, then a thread per camera adds the rest. The
+  // All poses and one packet per camera come first. Then one thread per camera adds the rest. The
   // mapper waits a second for a camera, and the recording is shorter.
   const Samples samples = samplesOf(shaken(SyntheticRecording(0.9)));
   for (const bool is_refined : {false, true}) {

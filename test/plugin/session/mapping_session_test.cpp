@@ -27,7 +27,7 @@ void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
   EXPECT_EQ(total.read, total.fates.total());
 }
 
-/// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
+/// Returns the median distance of the points from the dots' plane: steps of 30 planes, 1 to 5 m.
 double medianErrorInSteps(const MappingSession& session) {
   std::vector<DepthPair> pairs;
   const MapCloud::ConstPtr points = session.cloud().points();
@@ -43,13 +43,13 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
   for (const bool live : {false, true}) {
     EventFusionOptions options = syntheticOptions();
     options.mapper.fill_last_window =
-        true;  // but for live operation: back from the recording's end
+        true;  // has no effect in live operation; else the last window moves back from the end
     options.live.enabled = live;
     MappingSession session(options);
     EXPECT_EQ(mapAll(session, recording).size(), live ? 3U : 4U);
     ASSERT_GT(session.cloud().points()->size(), 30U);
-    // A window sees 8 px of parallax of dots that are rounded to pixels: an error of half a pixel
-    // is 0.5 / 8 of 1 / (2 m), a little over one step of the planes.
+    // In a window, dots have 8 px of parallax and are rounded to pixels. An error of half a pixel
+    // is 0.5 / 8 of 1 / (2 m), a little more than one plane step.
     EXPECT_LT(medianErrorInSteps(session), 1.5);
     const MapperCounts counts = session.status().counts;
     expectEventsAddUp(session.status(), recording.totalEvents());
@@ -123,7 +123,7 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
       ASSERT_NE(at, std::string::npos) << option.reason;
       const double seconds = std::stod(option.reason.substr(at + 17));
       const double expected =
-          is_full ? secondsBetween(times_ns[0], times_ns[fit]) : 1;  // all cameras are known then
+          is_full ? secondsBetween(times_ns[0], times_ns[fit]) : 1;  // all cameras are known at 1 s
       EXPECT_NEAR(seconds, expected, 0.03) << "up to a packet of 10 ms: " << option.reason;
       EXPECT_THAT(option.reason,
                   testing::EndsWith(is_full ? " s of a stream, 0 MB of events ([live] max_queue_mb)"
@@ -141,14 +141,14 @@ TEST(MappingSession, TheFirstLookAtARecordingIsNoLiveOperation) {
   EventFusionOptions options = automaticOptions();
   options.live.enabled = true;
   const RecordingSurvey survey = surveyOf(recording, options);
-  EXPECT_EQ(survey.samples.size(), 2U);  // of 2 s each
+  EXPECT_EQ(survey.samples.size(), 2U);  // samples of 2 s each
   EXPECT_NEAR(survey.duration_s.value_or(0), 4.2, 0.02);
 }
 
-/// On a machine that is too slow to map before the clock goes back.
+/// The machine is too slow to map before the clock goes back.
 TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
   const SyntheticRecording recording(1.3);
-  SyntheticRecording later = recording;  // of an earlier time: for 1 s it may only be late
+  SyntheticRecording later = recording;  // 100 s earlier; for 1 s the data may just be late
   constexpr std::int64_t kBackNs = 100 * kNanosecondsPerSecond;
   for (StampedPose& pose : later.poses) pose.t_ns -= kBackNs;
   for (auto& events : later.events) {
@@ -189,14 +189,14 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
   struct Row {
     double duration_s;
     std::vector<double> jumps_s;
-    std::set<std::ptrdiff_t> mapped;  // stretches, from 1
+    std::set<std::ptrdiff_t> mapped;  // numbers of the mapped segments, from 1
     bool before_the_end;
   };
   const Row rows[] = {
-      {2.4, {0.15, 0.3}, {3}, true},                 // the choice waits for the third stretch
-      {2.4, {0.4, 0.8, 1.2}, {1, 2, 3, 4}, true},    // chosen in the first one
-      {4.4, {1.5, 2.1, 2.7, 3.3}, {1, 4, 5}, true},  // shorter after two without a window
-      {0.9, {0.15}, {2}, false},                     // what the end leaves is chosen from
+      {2.4, {0.15, 0.3}, {3}, true},                 // the choice waits for the third segment
+      {2.4, {0.4, 0.8, 1.2}, {1, 2, 3, 4}, true},    // chosen in the first segment
+      {4.4, {1.5, 2.1, 2.7, 3.3}, {1, 4, 5}, true},  // shorter, after two without a window
+      {0.9, {0.15}, {2}, false},                     // at the end, chosen from the remaining data
   };
   for (const Row& row : rows) {
     SyntheticRecording recording(row.duration_s);
@@ -237,7 +237,7 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
 TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
   constexpr double kDepthM = 20;
   constexpr double kSpeedMS = 2;
-  for (const double rest_s : {1.3, 10.7}) {  // shorter and longer than the choice waits
+  for (const double rest_s : {1.3, 10.7}) {  // shorter and longer than the choice of options waits
     const SyntheticRecording recording(rest_s + 4.3, 1, {kDepthM, kSpeedMS, rest_s, 1});
     EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
@@ -247,7 +247,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
 
     ASSERT_FALSE(keyframes.empty()) << rest_s;
     const DepthPlanesOptions& planes = session.chosen().planes;
-    const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // in a window of 1 s
+    const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // 1/m, in a window of 1 s
     const double step = std::max(
         pixel, (1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1));
     std::vector<DepthPair> pairs;
@@ -339,7 +339,7 @@ TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
   MappingSession session(options);
   EventPacket outside = pieceOf(recording, 1, 0, 0.1);
   outside.events.front().t_ns =
-      SyntheticRecording::kStartNs - 1000;  // before the limits: not counted either
+      SyntheticRecording::kStartNs - 1000;  // before the limits: not counted, either
   outside.events.back().x = 120;
   const EventPacket good = pieceOf(recording, 1, 0.1, 0.5);
   session.addEvents(outside);
@@ -392,7 +392,7 @@ TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
 
 class CalibratedSession : public TemporaryFolder {
  protected:
-  /// Options with a calibration of other cameras.
+  /// Returns options with a calibration of other cameras.
   EventFusionOptions optionsOf(const std::vector<RigCamera>& cameras) const {
     EventFusionOptions options = syntheticOptions();
     options.rig.calibration = folder() / "camchain.yaml";
@@ -437,7 +437,7 @@ TEST_F(CalibratedSession, InLiveOperationADeclaredCameraMayBeginAtAnyTime) {
   EXPECT_EQ(session.status().rig.cameras[1].time_offset_ns, -2000);
   EXPECT_EQ(early, 4U) << "windows of 0.2 s, every 0.1 s, a second after a silent camera";
 
-  options.rig.calibration = folder() / "calib.txt";  // does not say the sensor's size
+  options.rig.calibration = folder() / "calib.txt";  // the file has no sensor size
   options.rig.time_offsets_ns.clear();
   std::ofstream(options.rig.calibration) << "100 100 59.5 44.5 0 0 0 0 0\n";
   EXPECT_EQ(MappingSession(options).status().rig.cameras.size(), 0U);

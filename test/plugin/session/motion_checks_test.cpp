@@ -24,7 +24,7 @@ using Names = std::multiset<std::string>;
 
 constexpr std::int64_t kBeginNs = 1'000'000'000'000;
 constexpr double kLengthS = 4;
-// With the focal length below, a centimetre is two pixels.
+// With the focal length below, 1 cm is two pixels.
 constexpr double kDepthM = 1;
 
 Names motionNames(const std::vector<Warning>& warnings) {
@@ -47,11 +47,11 @@ std::vector<Warning> warningsOf(const std::vector<StampedPose>& poses,
   return warnings;
 }
 
-/// A camera in a hand, its poses and the rate of its events.
+/// A hand-held camera: its poses and its event rate.
 struct Hand {
   double rate_hz = 100;
   std::vector<StampedPose> poses;
-  std::function<double(double)> events = [](double) { return 5'000.0; };  // per second, at t
+  std::function<double(double)> events = [](double) { return 5'000.0; };  // events per second at t
 
   /// @param motion T_world_rig(t).
   explicit Hand(double pose_rate_hz = 100, const std::function<Rigid3(double)>& motion = swing) {
@@ -61,7 +61,7 @@ struct Hand {
     }
   }
 
-  /// Half a metre and half a radian per second at most, three times within two seconds.
+  /// Swings at up to 0.5 m/s and 0.5 rad/s, three times within two seconds.
   static Rigid3 swing(double t_s) {
     const double phase = 2 * kPi * 1.5 * t_s;
     Rigid3 T_world_rig;
@@ -74,7 +74,7 @@ struct Hand {
     T_world_rig.translation = {0.5 * t_s, 0, 0};
     return T_world_rig;
   }
-  /// At rest between 1 and 3 s.
+  /// Rests between 1 and 3 s.
   static Rigid3 pause(double t_s) { return straight(t_s < 1 ? t_s : std::max(1.0, t_s - 2)); }
 
   static double secondsOf(const StampedPose& pose) { return secondsBetween(kBeginNs, pose.t_ns); }
@@ -97,7 +97,7 @@ struct Hand {
       pose.T_world_rig.rotation = rotationBy({0, y_rad, 0}) * pose.T_world_rig.rotation;
     });
   }
-  /// Leaves out the poses between both times.
+  /// Removes the poses between both times.
   Hand& cut(double from_s, double until_s) {
     std::vector<StampedPose> kept;
     for (const StampedPose& pose : poses) {
@@ -109,7 +109,7 @@ struct Hand {
   }
   Hand& shake(double sigma_m, double sigma_rad) {
     std::mt19937 random(3);
-    const auto noise = [&](double sigma) {  // a sum of uniform numbers, equal on every platform
+    const auto noise = [&](double sigma) {  // a sum of uniform numbers is equal on every platform
       double sum = 0;
       for (int i = 0; i < 12; ++i) sum += static_cast<double>(random()) / 4294967296.0;
       return sigma * (sum - 6);
@@ -157,7 +157,7 @@ const Names kJump = {"pose-jump"};
 const Names kGap = {"pose-interpolation"};
 
 TEST(MotionChecks, PosesThatRepeatWhileEventsComeAreFrozen) {
-  Hand early;  // than its tracker, which begins at 0.5 s
+  Hand early;  // its tracker begins later, at 0.5 s
   early.freeze(0, 0.5, [](double) { return Hand::swing(0.5); });
   expectNames({
       {"a hand", Hand(), {}},
@@ -256,7 +256,7 @@ TEST(MotionChecks, AStepThatATrackerOtherwiseDoesNotMakeIsAJump) {
                         "degrees/s beside"));
 }
 
-/// The warnings of measured poses with a steady stream of events.
+/// Returns the warnings for measured poses with a constant event rate.
 Names namesOf(const std::vector<StampedPose>& poses, double focal_px, double depth_m) {
   std::vector<Event> events;
   for (std::int64_t t_ns = poses.front().t_ns; t_ns < poses.back().t_ns; t_ns += 5'000'000) {
@@ -271,8 +271,8 @@ TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {
   struct Measured {
     const char* file;
     double focal_px;
-    double depth_m;  // of the scenes of this data set
-    double jump_m;   // that is seen
+    double depth_m;  // typical depth in this data set
+    double jump_m;   // smallest jump found
   };
   for (const Measured& row : {Measured{"rpg_eccv18_desk.txt", 200, 1.5, 0.05},
                               Measured{"tumvie_desk2.txt", 600, 1.5, 0.02},
@@ -298,7 +298,7 @@ TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {
 TEST(MotionChecks, LongRecordingsAreSeenWithTheSameMemory) {
   PoseMotion motion;
   const std::int64_t step_ns = 100'000'000;
-  for (std::int64_t i = 0; i < 40'000; ++i) {  // over an hour
+  for (std::int64_t i = 0; i < 40'000; ++i) {  // more than an hour
     Rigid3 T_world_rig = Hand::straight(0.1 * static_cast<double>(i));
     if (i >= 33'333) T_world_rig.translation.y() += 1;
     motion.add({kBeginNs + i * step_ns, T_world_rig});

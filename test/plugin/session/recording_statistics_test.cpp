@@ -17,7 +17,7 @@ TEST(EventRate, KeepsTheRateOverAnyLengthOfTime) {
   for (const std::int64_t step_ns : {1'000LL, 10'000'000LL, 3'600'000'000'000LL}) {
     const std::int64_t start_ns = 1'700'000'000'000'000'000;
     EventRate rate;
-    // 10,000 steps: one event each, none, and two each.
+    // 10,000 steps with one event each, then none, then two each.
     for (std::int64_t i = 0; i < 10'000; ++i) {
       const std::int64_t t_ns = start_ns + i * step_ns;
       if (i < 2500 || i >= 5000) rate.add(t_ns);
@@ -45,7 +45,7 @@ TEST(EventRate, AnEventBeforeTheFirstCountsAtTheStart) {
 TEST(EventRate, CountsOfABinAreInProportionToItsOverlap) {
   EventRate rate;
   EXPECT_EQ(rate.countIn(0, 5000), 0);
-  for (const std::int64_t t_ns : {0, 1, 2, 3, 1024, 1025}) rate.add(10'000 + t_ns);  // two bins
+  for (const std::int64_t t_ns : {0, 1, 2, 3, 1024, 1025}) rate.add(10'000 + t_ns);  // 2 bins
   EXPECT_EQ(rate.countIn(10'000, 10'512), 2);
   EXPECT_EQ(rate.countIn(9'488, 10'512), 2);
   EXPECT_EQ(rate.countIn(10'512, 11'536), 2 + 1);
@@ -73,7 +73,7 @@ Times timesOf(const std::vector<StampedPose>& poses) {
   return times;
 }
 
-/// Poses of these sources, at 1, 2, ...; those that `add` returns.
+/// Poses of `sources` at the times 1, 2, ..., and the times that `add` returns.
 struct Poses {
   std::vector<PoseSourceId> sources;
   Times used;
@@ -83,7 +83,7 @@ TEST(PoseSourceSelector, TheFirstSourceOfTheBestKindOrOfTheLabelIsUsed) {
   struct Row {
     std::string label;
     Poses before;
-    Times waited;  // what `select` returns
+    Times waited;  // the times that `select` returns
     Poses after;
     std::optional<PoseSourceId> selected;
     std::map<PoseSourceId, std::uint64_t> unused;
@@ -94,7 +94,7 @@ TEST(PoseSourceSelector, TheFirstSourceOfTheBestKindOrOfTheLabelIsUsed) {
       {"",
        {{kActions, kWheels, kWheels}, {}},
        {2, 3},
-       {{kWheels, kMocap}, {4}},  // a map has been begun
+       {{kWheels, kMocap}, {4}},  // the map has already begun
        kWheels,
        {{kMocap, 1}, {kActions, 1}}},
       {"", {}, {}, {{kActions, kMocap}, {1}}, kActions, {{kMocap, 1}}},
@@ -139,7 +139,7 @@ const std::string kSpans =
     "the events span 10.000000000 to 10.500000000 s (+0 to +0.5 s), the poses 10.100000000 to "
     "10.600000000 s (+0.1 to +0.6 s)";
 
-/// Events from 10 to 10.5 s, poses from 10.1 to 10.6 s, windows of a second.
+/// Returns the message. Events are at 10 to 10.5 s, poses at 10.1 to 10.6 s; a window is 1 s.
 std::string why(const std::function<void(SessionStatus&, FusionMapperOptions&)>& change) {
   SessionStatus status;
   status.events = TimeSpan{10'000 * kMsNs, 10'500 * kMsNs};

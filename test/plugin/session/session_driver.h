@@ -16,13 +16,13 @@
 
 namespace efm {
 
-/// All events of a camera in one packet.
+/// Returns all events of a camera in one packet.
 inline EventPacket packetOf(const SyntheticRecording& recording, int camera) {
   const auto index = static_cast<std::size_t>(camera);
   return {camera, recording.cameras[index], recording.events[index], std::nullopt};
 }
 
-/// The events of a camera in [begin, end), seconds since the recording's start.
+/// Returns a camera's events in [begin_s, end_s), in seconds since the recording's start.
 inline EventPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
                            double end_s) {
   EventPacket packet = packetOf(recording, camera);
@@ -35,14 +35,14 @@ inline EventPacket pieceOf(const SyntheticRecording& recording, int camera, doub
   return packet;
 }
 
-/// No keyframe is made with it.
+/// A sink that throws at each plane, so that no keyframe is made.
 struct AlwaysFailingSink : DsiSink {
   void addPlane(int /*plane*/, const float* /*values*/) override {
     throw std::runtime_error("disk full");
   }
 };
 
-/// A pose of the rig as a tracker's sample.
+/// Returns a pose of the rig as a tracker's sample.
 inline PoseSample sampleOf(const StampedPose& pose, const PoseSourceId& source = {},
                            const std::optional<PoseNoise>& noise = std::nullopt) {
   return {source, pose.t_ns, pose.T_world_rig, {}, noise};
@@ -69,7 +69,7 @@ inline std::vector<KeyframeDepthMap> mapRest(MappingSession& session) {
   return mapDue(session);
 }
 
-/// All poses, then the events of each camera in one packet.
+/// Adds all poses, then the events of each camera in one packet. @return all keyframes.
 inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
                                             const SyntheticRecording& recording) {
   addPoses(session, recording);
@@ -77,8 +77,8 @@ inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
   return mapRest(session);
 }
 
-/// In packets of this length, the last camera's first; maps after each.
-/// @return the keyframes before the end.
+/// Adds packets of `packet_ms`, the last camera's first, and maps after each time step.
+/// @return the keyframes that were made before the end of the input.
 inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
                                                    const SyntheticRecording& recording,
                                                    int packet_ms) {
@@ -111,7 +111,7 @@ inline void mapPiecewise(MappingSession& session, const SyntheticRecording& reco
   mapRest(session);
 }
 
-/// The same keyframes at the same poses, and the same points, bit for bit.
+/// Expects the same keyframes at the same poses and the same points, bit for bit.
 inline void expectSameMap(const MappingSession& session, const MappingSession& expected) {
   ASSERT_EQ(session.T_world_ref().size(), expected.T_world_ref().size());
   for (std::size_t i = 0; i < expected.T_world_ref().size(); ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A naive model says what becomes of each event, pose and window in live operation. The input queue
-// and the session agree with it after every step of random schedules.
+// Tests live operation against a naive model of each event, pose and window. The input queue and
+// the session agree with the model after every step of random schedules.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -30,7 +30,7 @@ constexpr int kTracker = -1;
 
 using Table = std::map<std::string, std::uint64_t>;
 
-/// Everything that is counted.
+/// Returns all counts.
 Table tableOf(const SessionStatus& status) {
   Table table;
   const MapperCounts& counts = status.counts;
@@ -63,7 +63,7 @@ Table tableOf(const SessionStatus& status) {
   return table;
 }
 
-/// The counts that differ.
+/// Returns the counts that differ.
 std::vector<std::string> differences(const Table& table, const Table& expected) {
   std::vector<std::string> rows;
   for (const auto& [what, count] : table) {
@@ -74,8 +74,8 @@ std::vector<std::string> differences(const Table& table, const Table& expected) 
   return rows;
 }
 
-/// What the session should count: windows of one length at one stride, given options. Keeps all
-/// that waits in plain lists and looks through all of it each time.
+/// A model of the session's counts for windows of one length and stride and given options. It keeps
+/// all waiting data in plain lists and searches all of them each time.
 class Model {
  public:
   explicit Model(const EventFusionOptions& options)
@@ -95,7 +95,7 @@ class Model {
   void addPose(const StampedPose& pose, bool is_odometry) {
     if (clock_reset_) return later_.push_back([=] { addPose(pose, is_odometry); });
     if (!rig_complete_ && is_odometry) {
-      waiting_.push_back(pose);  // for a better source
+      waiting_.push_back(pose);  // waits for a better source
     } else if (!use(pose)) {
       ++status.live->refused_poses;
       const auto& newest = clock_.newest_pose;
@@ -170,7 +170,7 @@ class Model {
     completeRig();
   }
 
-  /// The next window that can be mapped; those without events are passed.
+  /// Returns the next window that can be mapped. Windows without events are skipped.
   std::optional<Window> nextWindow() {
     if (!rig_complete_) return std::nullopt;
     do {
@@ -179,11 +179,11 @@ class Model {
     return std::nullopt;
   }
 
-  /// The same, without going on to the poses after a jump.
+  /// Returns the same window, but does not go on to the poses after a jump.
   std::optional<Window> oldestWindow() { return rig_complete_ ? windowOfStretch() : std::nullopt; }
 
   enum class Outcome { kMapped, kMappingFails, kStoringFails, kTooMuch };
-  /// @return whether it made a keyframe.
+  /// @return whether a keyframe was computed.
   bool map(const Window& window, Outcome outcome) {
     MapperCounts& counts = status.counts;
     bool empty = true;
@@ -215,7 +215,7 @@ class Model {
 
   bool rigIsComplete() const { return rig_complete_; }
   void giveUpOlderHalf() {
-    std::int64_t oldest_ns = kMaxTimeNs;  // of those that no earlier one can follow
+    std::int64_t oldest_ns = kMaxTimeNs;  // oldest event that no earlier event can follow
     for (const Camera& camera : clock_.cameras) {
       for (const Held& event : camera.held) {
         if (event.t_ns < completeNs(camera)) oldest_ns = std::min(oldest_ns, event.t_ns);
@@ -231,7 +231,7 @@ class Model {
                       too_large ? DropReason::kTooLarge : DropReason::kOverload);
   }
 
-  /// No window can be mapped now.
+  /// Drops and releases data when no window can be mapped.
   void wait() {
     if (finished_) return release(kMaxTimeNs);
     if (clock_.start_ns) release(std::min(nextStartNs(), completeNs()));
@@ -273,19 +273,19 @@ class Model {
     std::int64_t since_ns;
     std::map<int, std::int64_t> others_ns;
   };
-  /// All that begins anew when a clock goes back.
+  /// State that starts again when the clock goes back.
   struct Clock {
     std::array<Camera, kCameras> cameras;
     std::set<std::int64_t> poses_ns;
     std::optional<StampedPose> newest_pose;
     std::vector<StampedPose> next_stretch;  // poses after a jump
     std::optional<std::int64_t> start_ns;
-    std::int64_t next = 0;  // window
+    std::int64_t next = 0;  // number of the next window
     std::int64_t first_ns = kMaxTimeNs;
     std::int64_t newest_begin_ns = kMinTimeNs;
     std::int64_t reached_ns = kMinTimeNs;
     std::int64_t released_ns = kMinTimeNs;
-    std::vector<std::pair<std::int64_t, std::int64_t>> lost_ns;  // windows that are not mapped
+    std::vector<std::pair<std::int64_t, std::int64_t>> lost_ns;  // windows that were not mapped
     std::map<int, MissingEvents> missing;
     std::map<int, Older> older;
   };
@@ -320,7 +320,7 @@ class Model {
   void useAll(const std::vector<StampedPose>& poses) {
     for (const StampedPose& pose : poses) status.live->refused_poses += use(pose) ? 0 : 1;
   }
-  /// @return false where the pose is refused.
+  /// @return false if the pose is rejected.
   bool use(const StampedPose& pose) {
     if (!clock_.next_stretch.empty() || isJump(pose)) {
       clock_.next_stretch.push_back(pose);
@@ -356,7 +356,7 @@ class Model {
     const bool covered = clock_.reached_ns >= window.t1_ns && completeNs() >= window.t1_ns;
     return covered ? std::optional(window) : std::nullopt;
   }
-  /// The first event with a pose, once no camera can bring an earlier one.
+  /// Sets the start, the first event with a pose, once no camera can send an earlier event.
   bool findStart() {
     if (clock_.start_ns || clock_.poses_ns.empty()) return clock_.start_ns.has_value();
     std::int64_t first_ns = kMaxTimeNs;
@@ -406,7 +406,7 @@ class Model {
     clock_.released_ns = t_ns;
     decide(t_ns);
   }
-  /// Says what became of the events before a time.
+  /// Counts the fate of the events before a time.
   void decide(std::int64_t t_ns) {
     for (std::size_t c = 0; c < kCameras; ++c) {
       EventCounts& counts = status.counts.cameras[c];
@@ -428,8 +428,8 @@ class Model {
       clock_.cameras[c].held = later;
     }
   }
-  /// A clock that alone is behind the others is wrong; otherwise a second of older data says that
-  /// it went back.
+  /// A clock that alone is behind the others is wrong. Otherwise a second of older data means that
+  /// all clocks went back.
   void noteOlder(int sensor, std::int64_t t_ns) {
     for (auto& [other, older] : clock_.older) older.others_ns.erase(sensor);
     const Older older = clock_.older.try_emplace(sensor, Older{t_ns, {}}).first->second;
@@ -440,7 +440,7 @@ class Model {
     clock_reset_ = true;
     if (!rig_complete_) beginClock();
   }
-  /// Once the complete windows before are mapped.
+  /// Starts the new clock after the complete windows before it are mapped.
   bool beginClock() {
     if (!clock_reset_) return false;
     dropWindowsBefore(clock_.reached_ns + 1, DropReason::kClockReset);
@@ -467,10 +467,10 @@ class Model {
 
 enum Trouble {
   kHealthy,
-  kCameraSilent,     // its events are lost
-  kCameraLate,       // its packets come together, later
-  kCameraClockBack,  // one camera's
-  kClockBack,        // all clocks, for good
+  kCameraSilent,     // the camera's events are lost
+  kCameraLate,       // the camera's packets come together, later
+  kCameraClockBack,  // one camera's clock goes back
+  kClockBack,        // all clocks go back permanently
   kTrackerLost,
   kTrackerJumps,
   kTrackerClockBack,
@@ -480,11 +480,11 @@ enum Trouble {
   kLateEvents,
   kBadPackets,
   kPaused,
-  kHostStalls,  // it takes no input
+  kHostStalls,  // the host takes no input
   kMappingFails,
   kStoringFails,
   kTooMuchWaits,
-  kMemoryFails,  // of an input: not in the model
+  kMemoryFails,  // memory of an input: not in the model
   kNumTroubles
 };
 
@@ -503,11 +503,11 @@ const SyntheticRecording& sharedRecording() {
   return recording;
 }
 
-/// Session, queue and model in one thread.
+/// A test run: session, queue and model in one thread.
 class Run {
  public:
-  /// @param predicts the model says the windows. Otherwise only what holds for any windows is
-  /// compared.
+  /// @param predicts if true, the model predicts the windows; otherwise only properties of any
+  /// windows are compared.
   Run(const EventFusionOptions& options, const PoseSourceId& source, bool predicts)
       : options_(options), source_(source), predicts_(predicts) {}
 
@@ -529,7 +529,7 @@ class Run {
 
  private:
   void runPhase(const Phase& phase) {
-    // Odometry waits at first: the poses of two clocks would be mixed.
+    // Odometry waits at first, so the poses of two clocks would be mixed.
     const bool clock_back = phase.fault == kClockBack && session_.status().pose_source;
     if (clock_back) shift_ns_ -= 1503 * kMs + phase.ticks * kTickNs;
     if (phase.fault == kTrackerJumps) away_m_ += 10;
@@ -551,7 +551,7 @@ class Run {
     pose.t_ns += shift_ns_;
     pose.T_world_rig.translation.y() += away_m_;
     if (fault == kTrackerLost) return;
-    if (fault == kTrackerClockBack) pose.t_ns -= 3007 * kMs;  // at no other time again
+    if (fault == kTrackerClockBack) pose.t_ns -= 3007 * kMs;  // a time that no other pose has
     if (fault == kBadPoses) pose.T_world_rig.translation.x() = std::nan("");
     if (fault == kPosesTwice) queue_.add(sampleOf(pose, source_));
     queue_.add(sampleOf(pose, source_));
@@ -597,7 +597,7 @@ class Run {
     }
   }
 
-  /// As the mapping's thread does.
+  /// Does one step of the mapping thread.
   void step(const Phase& phase) {
     std::uint64_t queued = 0;
     for (const auto& [camera, counts] : queue_.counts()) {
@@ -612,7 +612,7 @@ class Run {
     compare();
   }
 
-  /// @return whether there were packets: more may wait behind skipped ones.
+  /// @return whether there were packets; more packets may wait behind skipped packets.
   bool takeBatch(const Phase& phase) {
     const InputQueue::Batch batch = queue_.take(true);
     const auto add = [&](auto input) {
@@ -660,7 +660,7 @@ class Run {
     return !batch.packets.empty();
   }
 
-  /// Nothing may wait: all windows that newer events follow are dropped.
+  /// Sets the limit of held events to zero: all windows that newer events follow are dropped.
   void limitHeld() {
     if (predicts_ && !model_.rigIsComplete()) return;
     messageOf([&] { session_.limitHeld(-1); });
@@ -716,7 +716,7 @@ class Run {
     RC_ASSERT(session_.T_odom_ref().size() == keyframes_);
     RC_ASSERT(session_.T_world_ref().size() == keyframes_);
     for (const auto& [what, count] : earlier_) {
-      // A choice of options counts the windows without a scene anew.
+      // The choice of options counts the windows without a scene again.
       RC_ASSERT(what == "given up: no_scene" || table.at(what) >= count);
     }
     earlier_ = table;
@@ -757,7 +757,7 @@ class Run {
 EventFusionOptions someOptions() {
   EventFusionOptions options = syntheticOptions();
   options.live.enabled = true;
-  // The second one's clock is ahead, or behind.
+  // The second camera's clock is ahead or behind.
   options.rig.time_offsets_ns = {7 * kMs, *rc::gen::element(0L, -3 * kS, 4 * kS)};
   options.mapper.keyframe.planes.num_planes = 4;
   options.mapper.keyframe.sweep.threads = 1;

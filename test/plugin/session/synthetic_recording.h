@@ -21,17 +21,17 @@
 
 namespace efm {
 
-/// What a synthetic recording is of.
+/// The scene and the motion of a synthetic recording.
 struct SyntheticScene {
   double depth_m = 2;
   double speed_m_s = 0.8;
-  double rest_s = 0;                    ///< The rig stands still so long at first.
-  int noise_per_step = 0;               ///< Events at random pixels, of each camera.
-  std::vector<Eigen::Vector3d> dots{};  ///< In the world; none: random ones in the view.
+  double rest_s = 0;                    ///< Duration of standstill at the beginning.
+  int noise_per_step = 0;               ///< Events of each camera at random pixels, per ms.
+  std::vector<Eigen::Vector3d> dots{};  ///< In world; if empty, random dots in the view.
 };
 
-/// Bright dots on a plane z = 2 m of the world, seen by a stereo rig that moves along x without
-/// turning: an event whenever a dot comes to another pixel. Small, exact and the same every time.
+/// Bright dots on the plane z = 2 m in world, seen by a stereo rig that moves along x without
+/// turning. A dot makes an event when it enters another pixel. Small, exact, always the same.
 struct SyntheticRecording {
   static constexpr double kDepthM = 2.0;
   static constexpr std::int64_t kStartNs = 10'000'000'000;  // a recording's clock is not 0 at first
@@ -41,7 +41,7 @@ struct SyntheticRecording {
   std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
   std::vector<StampedPose> poses;          ///< Every 10 ms, from the start to the end.
 
-  /// Moves by 0.8 m/s for `duration_s`; camera 1 stands 0.1 m to the right of camera 0.
+  /// Moves at 0.8 m/s for `duration_s`; camera 1 is 0.1 m to the right of camera 0.
   explicit SyntheticRecording(double duration_s = 0.5, int num_cameras = 2,
                               const SyntheticScene& scene = {})
       : scene_(scene) {
@@ -115,14 +115,14 @@ struct SyntheticRecording {
   SyntheticScene scene_;
 };
 
-/// Options that suit the synthetic recording: three keyframes in half a second.
+/// Returns options for the synthetic recording: they give three keyframes in half a second.
 inline EventFusionOptions syntheticOptions() {
   EventFusionOptions options;
   options.mapper.policy.window_s = 0.2;
   options.mapper.policy.stride_s = 0.1;
-  options.mapper.fill_last_window = false;  // as in live operation, which is compared with playback
+  options.mapper.fill_last_window = false;  // as in live operation; tests compare it with playback
   options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
-  options.mapper.keyframe.extraction.threshold_c = 60;  // lone dots stand out far
+  options.mapper.keyframe.extraction.threshold_c = 60;  // single dots stand out strongly
   return options;
 }
 
@@ -139,7 +139,7 @@ inline void writeDataset(const SyntheticRecording& recording, const std::filesys
   writeTumTrajectory(folder / "poses.txt", recording.poses);
 }
 
-/// What a tracker's poses of the synthetic recording err by: each keyframe's on its own.
+/// Pose errors of a simulated tracker: standard deviations per axis, drawn for each keyframe.
 struct Shake {
   double noise_m = 0.01;
   double noise_rad = 0.005;
@@ -147,7 +147,7 @@ struct Shake {
 };
 inline constexpr std::int64_t kShakenWindowNs = 100'000'000;
 
-/// The recording with poses that err, by the same within each window of 0.1 s.
+/// Returns the recording with wrong poses. The error is constant within each window of 0.1 s.
 inline SyntheticRecording shaken(SyntheticRecording recording, const Shake& shake = {}) {
   std::mt19937 random(shake.seed);
   std::normal_distribution<double> normal;
@@ -170,7 +170,7 @@ inline SyntheticRecording shaken(SyntheticRecording recording, const Shake& shak
   return recording;
 }
 
-/// Options that suit it: a keyframe in each window, whose poses are refined.
+/// Returns options for a shaken recording: one keyframe per window of 0.1 s, with pose refinement.
 inline EventFusionOptions refinedOptions() {
   EventFusionOptions options = syntheticOptions();
   options.mapper.policy.window_s = 0.1;
