@@ -30,22 +30,22 @@ class ProgramTest : public TemporaryFolder {
     std::string err;
   };
 
-  /// Runs a command of the shell.
+  /// Runs a shell command.
   Result shell(const std::string& command) const {
     return resultOf(std::system(
         ("cd '" + folder().string() + "' && " + command + " </dev/null >stdout.txt 2>stderr.txt")
             .c_str()));
   }
-  /// @param status as waitpid has it.
+  /// @param status from waitpid.
   Result resultOf(int status) const {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"),
             contentOf("stderr.txt")};
   }
-  /// Runs event-fusion. Arguments are quoted as for a shell.
+  /// Runs event-fusion. Arguments are quoted as in a shell.
   virtual Result run(const std::string& arguments) const {
     return shell("'" EFM_EVENT_FUSION "' " + arguments);
   }
-  /// Runs event-fusion, which must fail. @return its message.
+  /// Runs event-fusion, which must fail. @return its error message.
   std::string errorOf(const std::string& arguments) const {
     const Result result = run(arguments);
     EXPECT_NE(result.status, 0) << arguments;
@@ -64,7 +64,7 @@ class ProgramTest : public TemporaryFolder {
     std::filesystem::create_directories((folder() / file).parent_path());
     std::ofstream(folder() / file, std::ios::binary) << text;
   }
-  /// All files in a folder, sorted.
+  /// Returns all files in a folder, sorted.
   std::vector<std::string> filesIn(const std::string& name) const {
     std::vector<std::string> files;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder() / name)) {
@@ -80,7 +80,7 @@ class ProgramTest : public TemporaryFolder {
     writeDataset(recording, folder() / "data");
     write("rig.ini", optionText());
   }
-  /// `syntheticOptions` as an option file with a prefix before the names of sections.
+  /// Returns `syntheticOptions` as an option file. `prefix` stands before the section names.
   static std::string optionText(const std::string& prefix = "") {
     std::string text;
     std::string section;
@@ -97,7 +97,7 @@ class ProgramTest : public TemporaryFolder {
     const Result result = run("import data --out data.rawlog");
     ASSERT_EQ(result.status, 0) << result.err;
   }
-  /// Maps "data" or another recording with "rig.ini" to the folder `out`. @return map.pcd.
+  /// Maps "data" or another recording with "rig.ini" to folder `out`. @return map.pcd's content.
   std::string mapOf(const std::string& arguments, const std::string& out = "out") const {
     const Result result = run("map rig.ini " + arguments + " --out " + out);
     EXPECT_EQ(result.status, 0) << result.err;

@@ -13,7 +13,7 @@
 
 namespace efm {
 
-/// The message of the exception that a call throws.
+/// Returns the message of the exception that a call throws.
 template <typename Call>
 std::string messageOf(const Call& call) {
   try {
@@ -24,7 +24,7 @@ std::string messageOf(const Call& call) {
   return "no error";
 }
 
-/// A folder that each test has for itself, empty at first and gone afterwards.
+/// A folder for one test only. It is empty at first and removed afterwards.
 class TemporaryFolder : public testing::Test {
  protected:
   TemporaryFolder() {
@@ -52,20 +52,20 @@ inline void writeFile(const std::filesystem::path& file, const std::string& text
   stream << text;
 }
 
-/// The text with another part, which it must contain.
+/// Returns the text with `from` replaced. The text must contain `from`.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
 }
 
-/// All bytes of a file.
+/// Returns all bytes of a file.
 inline std::string readText(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// The message of the std::runtime_error that a call throws.
+/// Returns the message of the std::runtime_error that a call throws.
 template <typename Call>
 std::string errorOf(Call call) {
   try {

@@ -19,14 +19,14 @@
 
 namespace efm {
 
-/// Tests of event-fusion. They run it in a fork of the test, which loads its 300 libraries once.
+/// Tests of event-fusion. They run it in a fork of the test, so its 300 libraries load only once.
 class AppTest : public ProgramTest {
  protected:
   Result run(const std::string& arguments) const override {
     return interrupted(arguments, [] { return false; });
   }
 
-  /// Runs event-fusion and sends it a signal as soon as `ready` holds, unless it ends before.
+  /// Runs event-fusion and sends it a signal as soon as `ready` holds, unless it ended before.
   template <typename Ready>
   Result interrupted(const std::string& arguments, Ready ready, int signal = SIGINT) const {
     std::cout.flush();
@@ -59,7 +59,7 @@ class AppTest : public ProgramTest {
  private:
   int runHere(const std::string& arguments) const {
     for (const int number : {SIGINT, SIGTERM})
-      std::signal(number, SIG_DFL);  // the parent may ignore
+      std::signal(number, SIG_DFL);  // the parent may ignore the signal
     wordexp_t words{};
     const bool ready = chdir(folder().c_str()) == 0 && std::freopen("/dev/null", "r", stdin) &&
                        std::freopen("stdout.txt", "w", stdout) &&

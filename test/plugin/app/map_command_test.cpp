@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Results of `event-fusion map` and `depth`, complete and consistent with each other. Which files
-// each command makes, and what it says: program_table.txt.
+// Tests that results of `event-fusion map` and `depth` are complete and agree. program_table.txt
+// has the files and the messages of each command.
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Options of `event-fusion map` and `depth` that change values of the result: see also
+// Tests options of `event-fusion map` and `depth` that change values of the result. See also
 // program_table.txt.
 #include <opencv2/core.hpp>
 
@@ -29,7 +29,7 @@ TEST_F(MapOptions, TheSequencesWhiteLevelIsComputedInAFirstPass) {
                   &largest);
     maxima.push_back(largest);
   }
-  // Of fewer than twenty keyframes the robust maximum is the plain one.
+  // For fewer than twenty keyframes the robust maximum is the plain maximum.
   const double expected = *std::max_element(maxima.begin(), maxima.end());
   EXPECT_EQ(report["sequence_maximum"], expected);
   std::ostringstream number;
@@ -47,7 +47,7 @@ TEST_F(MapOptions, TheSequencesWhiteLevelIsComputedInAFirstPass) {
   EXPECT_EQ(reportIn("one")["sequence_maximum"], expected) << "that of the whole recording";
 }
 
-/// Root mean square of the relative errors between neighbours.
+/// Returns the root mean square of the relative errors between neighbouring poses.
 double relativeError(const std::vector<StampedPose>& poses, const std::vector<StampedPose>& truth) {
   std::vector<PosePair> pairs;
   EXPECT_EQ(poses.size(), truth.size());
@@ -62,7 +62,7 @@ double relativeError(const std::vector<StampedPose>& poses, const std::vector<St
 
 TEST_F(MapOptions, RefinedPosesAndTheTrackersAreWritten) {
   writeDataset(SyntheticRecording(1.3), folder() / "long");
-  const std::string map = "long --set keyframes.window_s=0.1 ";  // a keyframe each 0.1 s
+  const std::string map = "long --set keyframes.window_s=0.1 ";  // one keyframe per 0.1 s
   mapOf(map, "exact");
   const auto truth = posesIn("exact");
   const std::string begin = formatSeconds(truth.front().t_ns - 50'000'000);
@@ -97,7 +97,7 @@ TEST_F(MapOptions, RefinedPosesAndTheTrackersAreWritten) {
 TEST_F(MapOptions, AHandEyeTransformMakesPosesOfTheRigFromPosesOfTheBody) {
   const std::string exact = mapOf("data", "exact");
   const auto expected = posesIn("exact");
-  // A tracker's poses, whose body the rig is turned and moved on.
+  // Makes a tracker's poses of a body on which the rig is rotated and moved.
   Eigen::Matrix3d rotation;
   rotation << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Rigid3 T_body_rig = {Eigen::Quaterniond(rotation), {0.4, 0.2, -0.1}};
@@ -122,7 +122,7 @@ TEST_F(MapOptions, AHandEyeTransformMakesPosesOfTheRigFromPosesOfTheBody) {
   EXPECT_EQ(mapOf("r.rawlog"), map) << "a rawlog remembers it";
   EXPECT_EQ(mapOf("r.rawlog --hand-eye rigs/hand_eye.yaml"), map) << "given twice is given once";
 
-  // Names in an option file are relative to it; the command line comes first.
+  // File names in an option file are relative to the file. The command line has priority.
   std::filesystem::rename(folder() / "data" / "camchain.yaml", folder() / "rigs" / "camchain.yaml");
   std::string ini = contentOf("rig.ini");
   ini = std::regex_replace(ini, std::regex("calibration = *"), "calibration=camchain.yaml");

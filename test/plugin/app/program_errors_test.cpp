@@ -21,7 +21,7 @@ namespace {
 
 using ::testing::StartsWith;
 
-/// What an exception of `raise` says to the user.
+/// Returns the message for the user if `raise` throws.
 template <typename Raise>
 std::string wordsOf(const Raise& raise) {
   try {
@@ -79,7 +79,7 @@ TEST_F(ProgramOutput, ThatCannotBeWrittenIsAnError) {
   }
 }
 
-// What a signal leaves. `map` is stopped at any time in test/integration/interruption_test.cpp.
+// Results after a signal. test/integration/interruption_test.cpp stops `map` at any time.
 
 namespace {
 
@@ -87,7 +87,7 @@ using testing::HasSubstr;
 
 class Interrupted : public AppTest {
  protected:
-  /// Files may come and go meanwhile.
+  /// Returns whether a file name contains `part`. Files may appear and vanish during the search.
   bool anyNameHas(const std::string& part) const {
     std::error_code gone;
     std::filesystem::recursive_directory_iterator entry(folder(), gone);
@@ -102,9 +102,9 @@ TEST_F(Interrupted, CommandsLeaveTheirWholeResultOrNothing) {
   write(SyntheticRecording(5.0));
   struct Command {
     const char* arguments;
-    const char* started;  // a part of the name of the unfinished result
+    const char* started;  // a part of the unfinished result's name
     const char* result;
-    bool is_long;  // it cannot end before the signal
+    bool is_long;  // the command cannot end before the signal
   };
   const Command cases[] = {
       {"import data --out r.rawlog", "r.partial", "r.rawlog", false},
@@ -126,7 +126,7 @@ TEST_F(Interrupted, CommandsLeaveTheirWholeResultOrNothing) {
 }
 
 TEST_F(Interrupted, AStoppedMapReplacesAnEarlierResultAndAKilledOneDoesNot) {
-  write(SyntheticRecording(4.0));  // 400 keyframes: it cannot end before the signal
+  write(SyntheticRecording(4.0));  // 400 keyframes: the run cannot end before the signal
   const std::string map = "map rig.ini data --out out";
   const std::string slow = map + " --set keyframes.stride_s=0.01";
   const auto writes = [this] { return anyNameHas("depth.partial-"); };
@@ -167,18 +167,18 @@ TEST_F(Interrupted, TwoImportsOfOneNameWriteTheWholeResultOfOne) {
 
 }  // namespace
 
-// A host program may write numbers as 1.234,5: files and results do not follow it.
+// A host program may write numbers as 1.234,5. Files and results must not do so.
 
 namespace {
 
-/// 1.234,5
+/// Writes numbers as 1.234,5.
 class Grouping : public std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }
   std::string do_grouping() const override { return "\3"; }
 };
 
-/// The locales of C++ and, if it is installed, of C.
+/// Sets the locale of C++ and, if it is installed, the locale of C.
 class GroupingLocale {
  public:
   GroupingLocale()
@@ -248,7 +248,7 @@ TEST_F(NumbersOfFiles, DoNotFollowTheLocaleOfTheProgram) {
   for (const std::string& file : files) {
     if (!exists(folder() / "grouping" / file)) continue;
     const std::string name = std::filesystem::path(file).filename().string();
-    if (name == "map.html") continue;  // it has the times of the report
+    if (name == "map.html") continue;  // the page contains the times of the report
     const std::string expected = contentOf("classic/" + file);
     const std::string content = contentOf("grouping/" + file);
     if (name == "report.json") {
@@ -259,7 +259,7 @@ TEST_F(NumbersOfFiles, DoNotFollowTheLocaleOfTheProgram) {
   }
 }
 
-/// A stream, a clock and a terminal that the test sets.
+/// A stream, a clock and a terminal. The test sets the clock and the terminal's width.
 struct FakeTerminal {
   std::ostringstream stream;
   double now_s = 1000;
@@ -268,7 +268,7 @@ struct FakeTerminal {
   ProgressOutput output() {
     return {stream, [this] { return columns; }, [this] { return now_s; }};
   }
-  /// What was written since the last call.
+  /// Returns the text that was written since the last call.
   std::string written() {
     std::string text = stream.str();
     stream.str("");
@@ -278,7 +278,7 @@ struct FakeTerminal {
 
 TEST(Progress, OnATerminalFillsItsWidthAndFallsBackToTheWordsAlone) {
   const std::pair<int, std::string> cases[] = {
-      // 59 of 60 columns: the last one stays free.
+      // 59 of 60 columns: the last column stays free
       {60, "mapping [=====                  ]  25 %, 30 s left, details"},
       {200, "mapping [==========                              ]  25 %, 30 s left, details"},
       {35, "mapping  25 %, 30 s left, details"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Runs each command of program_table.txt: its status, its output and the files that it makes are as
-// the table says. The files that were there stay as they are.
+// Runs each command of program_table.txt. Its status, its output and its new files must be as in
+// the table, and files that existed before must not change.
 
 #include <map>
 #include <optional>
@@ -25,8 +25,8 @@ constexpr bool kHasHdf5 = false;
 
 class ProgramTable : public AppTest {
  protected:
-  /// Writes a recording of half a second ("data"; "same.pcd" is its map), one of 1.3 s ("long"),
-  /// one of the UZH layout ("small"), and the inputs that a shell cannot write.
+  /// Writes a recording of half a second ("data"; "same.pcd" is its map), a recording of 1.3 s
+  /// ("long"), a recording of the UZH layout ("small"), and inputs that a shell cannot write.
   void SetUp() override {
     write(SyntheticRecording());
     writeDataset(SyntheticRecording(1.3), folder() / "long");
@@ -47,14 +47,14 @@ class ProgramTable : public AppTest {
     cv::imwrite((folder() / "mm.png").string(), cv::Mat_<std::uint16_t>(90, 120, std::uint16_t{9}));
   }
 
-  /// A command behind "ulimit -f N; " cannot write files above N blocks of 512 bytes.
+  /// Runs a command. After "ulimit -f N; " it cannot write more than N blocks of 512 bytes.
   Result runRow(const std::string& command) const {
     const std::size_t limit = command.find("; ");
     if (limit == std::string::npos) return run(command);
     return shell(command.substr(0, limit + 2) + "'" EFM_EVENT_FUSION "' " +
                  command.substr(limit + 2));
   }
-  /// Commands of the shell, which must succeed. They may read what the last command printed.
+  /// Runs shell commands, which must succeed. They may read the last command's output.
   void expectSuccess(const std::string& script) const {
     const std::string functions =
         "points() { LC_ALL=C sed -nE 's/^(POINTS|element vertex) //p' $1; }\n"
@@ -74,7 +74,7 @@ class ProgramTable : public AppTest {
     }
     return files;
   }
-  /// The names in the folder.
+  /// Returns the names in the folder.
   std::set<std::string> names() const {
     std::set<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder()))
@@ -83,10 +83,10 @@ class ProgramTable : public AppTest {
   }
 };
 
-/// A command and what must come of it: see program_table.txt.
+/// A command and its expected results: see program_table.txt.
 struct Row {
   std::string command;
-  bool is_first = true;  // The files of the rows before it are removed.
+  bool is_first = true;  // if true, the earlier rows' files are removed
   std::string preparation;
   std::string status_and_errors;
   std::optional<std::set<std::string>> files;
@@ -96,7 +96,7 @@ struct Row {
   std::string check;
 };
 
-/// `MAP` and `KEYFRAME` at the end of a name stand for the files of a map and of `depth`.
+/// Returns file names. `MAP`, `KEYFRAME` at a name's end: the files of a map, of `depth`.
 std::set<std::string> filesOf(const std::string& text) {
   const std::map<std::string, std::vector<std::string>> results = {
       {"MAP",
@@ -147,7 +147,7 @@ std::vector<Row> readRows() {
   return rows;
 }
 
-/// Each … in the expected text stands for any text.
+/// Compares two texts. Each … in the expected text stands for any text.
 void expectText(const std::string& found, const std::string& expected) {
   const std::string escaped =
       std::regex_replace(expected, std::regex(R"([.^$|()\[\]{}*+?\\])"), R"(\$&)");
@@ -155,7 +155,7 @@ void expectText(const std::string& found, const std::string& expected) {
   EXPECT_TRUE(std::regex_match(found, pattern)) << found << "\nis not\n" << expected;
 }
 
-/// The name of a file of any keyframe.
+/// Replaces a keyframe's time in a file name by *.
 std::string ofAnyKeyframe(const std::string& file) {
   return std::regex_replace(file, std::regex("keyframes/[^/]*/"), "keyframes/*/");
 }
@@ -201,7 +201,7 @@ TEST_F(ProgramTable, EachRowHolds) {
       }
     }
     for (const std::string& part : row.parts_of_out) EXPECT_THAT(result.out, HasSubstr(part));
-    // Of a wrong command line, of a result that cannot be written, and if it is quiet.
+    // The output is empty for wrong command lines, results that cannot be written, and --quiet.
     if (result.status == 2 || std::regex_search(row.command, std::regex("^ulimit|--quiet"))) {
       EXPECT_EQ(result.out, "");
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `event-fusion simulate` on a trajectory with a calibration, as a user runs it.
+// Tests `event-fusion simulate` with a trajectory and a calibration, as a user runs it.
 #include <cstdlib>
 
 #include "mapping/geometry/rig.h"
@@ -20,7 +20,7 @@ class SimulateCommand : public AppTest {
     EXPECT_EQ(result.status, 0) << arguments << "\n" << result.err;
   }
 
-  /// Three small cameras in three orientations, and a second of walking ahead.
+  /// Writes three small cameras in three orientations and one second of walking ahead.
   void writeRigAndTrajectory() const {
     std::ofstream chain(folder() / "rig.yaml");
     const char* const models[] = {
@@ -59,7 +59,7 @@ TEST_F(SimulateCommand, WritesTheGivenRig) {
 
 }  // namespace
 
-// `event-fusion evaluate` on results of `map` and `depth`.
+// Tests `event-fusion evaluate` on results of `map` and `depth`.
 
 namespace {
 
@@ -123,7 +123,7 @@ TEST_F(EvaluateCommand, ComparesTheMapOfARecordingWithItsFolder) {
   EXPECT_THAT(table.out, AllOf(HasSubstr("outliers %"), HasSubstr("100.00")));
   EXPECT_FALSE(image("map.png").empty());
 
-  // The rig moves along a line: least squares cannot say how it is turned about that.
+  // The rig moves along a line: least squares cannot find its rotation about the line.
   EXPECT_THAT(errorOf("evaluate trajectory out data"),
               AllOf(HasSubstr("positions lie on a line"), HasSubstr("--align origin")));
   for (const char* alignment : {"none", "origin"}) {
@@ -157,13 +157,13 @@ TEST_F(EvaluateCommand, ComparesOneDepthMapWithAFile) {
 
 }  // namespace
 
-// `event-fusion view` as a user runs it, with a made-up opener in the PATH.
+// Tests `event-fusion view` as a user runs it, with a fake opener in the PATH.
 
 namespace {
 
 class ViewCommand : public AppTest {
  protected:
-  /// The opener ends with a status.
+  /// Installs an opener that ends with `status`.
   void putOpener(int status) {
     write("bin/xdg-open", "#!/bin/sh\necho \"$1\" >opened.txt\necho chatter\nexit " +
                               std::to_string(status) + "\n");

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Points of the floor and of two walls of a room of 4 x 3 x 2 m, every 5 cm, and of a box on the
+/// Returns points every 5 cm: a room of 4 x 3 x 2 m with floor and two walls, and a box on its
 /// floor.
 std::vector<CloudPoint> room(const Eigen::Vector3d& corner) {
   std::vector<CloudPoint> points;
@@ -34,7 +34,7 @@ std::vector<CloudPoint> room(const Eigen::Vector3d& corner) {
   return points;
 }
 
-/// Every third point with 1 cm of noise, each tenth of these an outlier of up to 1 m.
+/// Returns every third point with 1 cm of noise. A tenth of them are outliers of up to 1 m.
 std::vector<CloudPoint> noisy(const std::vector<CloudPoint>& truth) {
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0, 0.01);
@@ -58,7 +58,7 @@ TEST(AlignCloud, RecoversAKnownTransform) {
   const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 2) / 3;
   const auto turned = [&](double angle_rad) { return rotationBy(angle_rad * axis); };
   struct Case {
-    Rigid3 T_map_truth;  ///< About the corner of the room.
+    Rigid3 T_map_truth;  ///< Rotates about the corner of the room.
     Eigen::Vector3d corner;
   };
   const Eigen::Vector3d utm(450'000, 5'200'000, 300);
@@ -74,8 +74,8 @@ TEST(AlignCloud, RecoversAKnownTransform) {
           example.T_map_truth * Eigen::Vector3d(point.p_world - example.corner) + example.corner;
     }
     const CloudAlignment alignment = alignCloud(displaced, truth);
-    // 3,600 points, 800 at least on each wall: 1 cm of noise moves a wall by 1 cm / sqrt(800) =
-    // 0.35 mm, and its far end twice that. Five times this, because outliers near the walls count.
+    // 3,600 points, at least 800 on each wall: 1 cm of noise moves a wall by 1 cm / sqrt(800) =
+    // 0.35 mm, and its far end by twice that. Five times this, as outliers near walls count.
     double worst_m = 0;
     for (std::size_t i = 0; i < map.size(); ++i) {
       const Eigen::Vector3d error = alignment.T_truth_map * displaced[i].p_world - map[i].p_world;
@@ -83,7 +83,7 @@ TEST(AlignCloud, RecoversAKnownTransform) {
     }
     EXPECT_LT(worst_m, 5 * 0.7e-3) << example.T_map_truth.translation.transpose();
     EXPECT_EQ(alignment.points, map.size());
-    // All but the outliers (a tenth) and the tail of the noise.
+    // All points but the outliers (a tenth) and the tail of the noise are used.
     EXPECT_GT(alignment.points_used, 0.85 * map.size());
     EXPECT_LT(alignment.points_used, map.size());
   }
@@ -98,7 +98,7 @@ TEST(AlignCloud, WhatCannotBeAlignedIsAnErrorThatSaysWhy) {
   const std::vector<CloudPoint> few(truth.begin(), truth.begin() + 49);
   EXPECT_THAT(errorOf(few, truth), HasSubstr("49 points of the map"));
   EXPECT_THAT(errorOf(truth, few), HasSubstr("expected at least 50 of each"));
-  // Only the floor, exact and with the noise of a scanner.
+  // A map of the floor only, exact and with the noise of a scanner.
   const std::vector<CloudPoint> floor(truth.begin(), truth.begin() + 80 * 60);
   EXPECT_THAT(errorOf(noisy(truth), floor), HasSubstr("not a single wall"));
   std::vector<CloudPoint> rough = floor;
@@ -106,13 +106,13 @@ TEST(AlignCloud, WhatCannotBeAlignedIsAnErrorThatSaysWhy) {
   std::normal_distribution<double> noise(0, 0.002);
   for (CloudPoint& point : rough) point.p_world.z() += noise(random);
   EXPECT_THAT(errorOf(noisy(truth), rough), HasSubstr("not a single wall"));
-  // The truth has all walls, the map only the floor away from them.
+  // The truth has all walls; the map has only the floor away from the walls.
   std::vector<CloudPoint> middle;
   for (const CloudPoint& point : floor) {
     if (point.p_world.x() > 2.5 && point.p_world.y() > 0.5) middle.push_back(point);
   }
   EXPECT_THAT(errorOf(noisy(middle), truth), HasSubstr("not a single wall"));
-  // A map of something else.
+  // A map of another scene.
   std::vector<CloudPoint> other;
   std::uniform_real_distribution<double> anywhere(-3, 3);
   for (int i = 0; i < 300; ++i) {
@@ -125,7 +125,7 @@ using testing::AllOf;
 
 class EvaluateCloud : public TemporaryFolder {
  protected:
-  /// Points along x.
+  /// Writes points along x.
   std::filesystem::path cloud(const std::string& name, const std::vector<double>& xs_m) const {
     const auto path = folder() / name;
     std::filesystem::create_directories(path.parent_path());
@@ -199,7 +199,7 @@ TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
 }
 
 TEST_F(EvaluateCloud, AlignsAMapWithTheTruthOnlyWhereAsked) {
-  // A corner of three squares of 1 m, every 5 cm; the map lies 0.125 m farther along each axis.
+  // The truth: a corner of three squares of 1 m, every 5 cm. The map is 0.125 m off on each axis.
   std::vector<CloudPoint> map;
   std::vector<Eigen::Vector3f> truth;
   for (int i = 0; i < 3 * 20 * 20; ++i) {
@@ -217,7 +217,7 @@ TEST_F(EvaluateCloud, AlignsAMapWithTheTruthOnlyWhereAsked) {
 
   const auto aligned =
       evaluateCloud(folder() / "map.pcd", folder() / "truth.ply", {{0.05}, {}, true});
-  // Without noise, only the last step (0.01 mm) and the rounding of floats are left.
+  // Without noise, only the last step (0.01 mm) and the rounding of floats remain.
   EXPECT_LT(aligned.errors.accuracy.max, 1e-4);
   EXPECT_EQ(aligned.errors.steps.at(0).completeness, 1) << "of the truth to the moved map";
   EXPECT_THAT(evaluationTable(aligned), AllOf(HasSubstr("moved by (-0.125"), HasSubstr("turned by"),

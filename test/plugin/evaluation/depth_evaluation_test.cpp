@@ -33,7 +33,7 @@ TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
   for (const char* name : {"1.000000000", "2.000000000", "3.000000000"}) {
     tiff("out/keyframes/" + std::string(name) + "/depth.tiff", 2);
   }
-  tiff("out/keyframes/4.000000000/depth.tiff", 0);  // no points: not part of the mean
+  tiff("out/keyframes/4.000000000/depth.tiff", 0);  // without points: does not count in the mean
   tiff("data/depth/cam0_a.tiff", 3);
   tiff("data/depth/cam0_b.tiff", 4);
   std::ofstream(folder() / "data/depth/index.txt")
@@ -78,7 +78,7 @@ TEST_F(EvaluateDepth, AMaskAndAScaleApplyToAllMaps) {
 
 TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
   DepthEvaluationOptions options;
-  options.focal_baseline = 40;  // 20 px and 10 px
+  options.focal_baseline = 40;  // disparities of 20 px and 10 px
   const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
   EXPECT_EQ(evaluation.mean.bad_pix_5px, 1);
   const auto json =
@@ -155,7 +155,7 @@ TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("within 1 ms"));
 }
 
-/// Writes and finds the texts of a folder.
+/// Writes and finds text files in a folder.
 class TextFolder : public TemporaryFolder {
  protected:
   void write(const std::string& file, const std::string& text = "") const {
@@ -177,14 +177,14 @@ TEST_F(FindStereoBaseline, IsInTheRunsReportOrElseInTheDatasetsCalibration) {
   write("out/keyframes/1.5/depth.tiff");
   write("data/depth/a.tiff");
   struct Case {
-    std::string report, camchain;  // empty: none
+    std::string report, camchain;  // empty: the file is missing
     const char *estimate, *truth;
-    double focal_px, baseline_m;  // 0: not found
+    double focal_px, baseline_m;  // 0 if not found
   };
   for (const Case& each : std::vector<Case>{
            {full, two, "out", "data", 200.5, 0.1},
            {full, two, "out/keyframes/1.5/depth.tiff", "data", 200.5, 0.1},
-           {full, one, "out/a/b/c/d", "data", 0, 0},  // higher than a run has folders
+           {full, one, "out/a/b/c/d", "data", 0, 0},  // a run's result has fewer folder levels
            {"{}", two, "out", "data", 300, 0.5},
            {"[1]", two, "out", "data/depth", 300, 0.5},
            {"{", two, "out", "data/depth/a.tiff", 300, 0.5},
@@ -214,7 +214,7 @@ using testing::ElementsAre;
 
 class DepthSeries : public TextFolder {
  protected:
-  /// The files of a series, as paths inside the test's folder.
+  /// Returns the files of a series as paths inside the test's folder.
   std::vector<std::string> filesOf(const std::string& name, DepthSeriesRole role) const {
     std::vector<std::string> files;
     for (const TimedFile& file : depthSeries(folder() / name, role)) {
@@ -237,7 +237,7 @@ TEST_F(DepthSeries, AFolderWithBothKindsReturnsTheMapsOfTheRole) {
   const auto listed = ElementsAre("both/depth/a.tiff", "both/depth/b.tiff");
   EXPECT_THAT(filesOf("both", DepthSeriesRole::kEstimate), maps);
   EXPECT_THAT(filesOf("both", DepthSeriesRole::kTruth), listed);
-  // A folder with one kind has it for both roles.
+  // If a folder has one kind of file only, this kind serves both roles.
   EXPECT_THAT(filesOf("both/keyframes", DepthSeriesRole::kTruth), maps);
   EXPECT_THAT(filesOf("both/depth", DepthSeriesRole::kEstimate), listed);
 }

@@ -49,7 +49,7 @@ class DepthFile : public TemporaryFolder {
                       std::optional<double> scale = std::nullopt) const {
     return messageOf([&] { readDepthFile(file, scale); });
   }
-  /// 1 2 3 / 4 5 6
+  /// Expects the depths 1 2 3 / 4 5 6.
   void expectOneToSix(const cv::Mat1f& depth_m) const {
     ASSERT_EQ(depth_m.size(), cv::Size(3, 2));
     for (int k = 0; k < 6; ++k) EXPECT_EQ(depth_m(k / 3, k % 3), k + 1) << k;

@@ -24,7 +24,7 @@ using Unit = RelativeSpacing::Unit;
 
 class EvaluateTrajectory : public TemporaryFolder {
  protected:
-  /// A helix of a pose each tenth of a second, moved by `T_map_world`, the clock ahead.
+  /// Writes a helix with a pose every 0.1 s, moved by `T_map_world`. Its clock is ahead.
   std::filesystem::path helix(const std::string& name, const Rigid3& T_map_world = {},
                               double ahead_s = 0) const {
     std::vector<StampedPose> poses;
@@ -140,7 +140,7 @@ TEST_F(EvaluateTrajectory, TheTableSaysWhatItComparesIn80Columns) {
                       HasSubstr("30 of 40 estimated and 30 true poses, at most 0.004 s apart\n"),
                       HasSubstr("0.000000000 s to 2.900000000 s: 2.900 s\n"), HasSubstr(name),
                       HasSubstr(transform)));
-    std::istringstream lines(table.substr(table.find("pairs  ")));  // after the files' names
+    std::istringstream lines(table.substr(table.find("pairs  ")));  // starts after the files' names
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   }
 }
@@ -171,7 +171,7 @@ TEST(ValuePicture, NanIsWhiteOrWhatLiesUnder) {
 
 class EvaluationPlot : public TemporaryFolder {
  protected:
-  /// A depth map of one depth with a hole, and twice the depth in its lower half.
+  /// Writes a depth map of one depth with a hole. Its lower half has twice the depth.
   std::filesystem::path tiff(const std::string& name, float depth_m) const {
     const auto file = folder() / name;
     std::filesystem::create_directories(file.parent_path());

@@ -49,7 +49,7 @@ mrpt::poses::CPose3DPDFGaussian estimateOf(const CEventFusionMapBuilder& builder
   return dynamic_cast<const mrpt::poses::CPose3DPDFGaussian&>(*builder.getCurrentPoseEstimation());
 }
 
-/// The poses are random, and their noise alternates between keyframes.
+/// Returns samples with random poses. Their noise alternates between keyframes.
 Samples noisySamples() {
   Samples samples = samplesOf(shaken(SyntheticRecording(1.3)));
   for (Sample& sample : samples) {
@@ -61,7 +61,7 @@ Samples noisySamples() {
   return samples;
 }
 
-/// MRPT's maps hold the builder's map.
+/// Expects that MRPT's maps contain the builder's map.
 void expectGettersAgree(CEventFusionMapBuilder& builder) {
   const MapCloud::ConstPtr points = builder.points();
   const std::vector<StampedPose> trajectory = builder.trajectory();
@@ -76,10 +76,10 @@ void expectGettersAgree(CEventFusionMapBuilder& builder) {
     EXPECT_LT(std::abs(keyframe.t_ref_ns - trajectory[number].t_ns), kTickNs);
     EXPECT_EQ(keyframe.T_world_ref.translation, T_world_ref.translation);
     EXPECT_LT(keyframe.T_world_ref.rotation.angularDistance(T_world_ref.rotation), 1e-14);
-    // The simplemap's angles may round: the cloud is compared at the exact pose.
+    // The simplemap's angles may round, so the cloud is compared at the exact pose.
     cloud.insert(number++, pointsInWorld(*keyframe.points, T_world_ref), T_world_ref);
   }
-  auto expected = pcl::make_shared<MapCloud>(*points);  // a simplemap has no place for sigma
+  auto expected = pcl::make_shared<MapCloud>(*points);  // a simplemap cannot store sigma
   for (MapPoint& point : *expected) point.sigma = MapPoint().sigma;
   expectSameBits(cloud.points(), expected);
 
@@ -125,7 +125,7 @@ TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
     play(mapper, samples);
 
     builder.initialize(initial);
-    for (const auto& [pose, frame] : initial) {  // the builder has copies
+    for (const auto& [pose, frame] : initial) {  // clearing must not change the builder's copies
       frame->getObservationByClass<CObservationPointCloud>()->pointcloud->clear();
     }
     EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 12U);
@@ -213,7 +213,7 @@ TEST_P(BuilderInEitherMode, StartsOverAtAnyTimeWithTheSameCallbacksAndSink) {
   } sink;
   const Samples samples = samplesOf(SyntheticRecording(1.3));
   const auto observations = observationsOf(samples);
-  CEventFusionMapBuilder builder(in(refinedOptions()));  // keyframes wait for the refinement
+  CEventFusionMapBuilder builder(in(refinedOptions()));  // the keyframes wait for the refinement
   builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
   builder.setDsiSink(&sink);
   std::atomic<int> keyframes{0};
@@ -231,7 +231,7 @@ TEST_P(BuilderInEitherMode, StartsOverAtAnyTimeWithTheSameCallbacksAndSink) {
   builder.initialize();
   ASSERT_EQ(finished.wait_for(std::chrono::seconds(60)), std::future_status::ready);
   EXPECT_EQ(builder.ignoredObservations(), 0U);
-  builder.initialize();  // the other thread may have finished the new map
+  builder.initialize();  // the other thread may have finished the new map already
   feed(builder, observations);
   builder.setOptions(in());
   EXPECT_TRUE(builder.points()->empty());
@@ -265,7 +265,7 @@ TEST(CEventFusionMapBuilder, AHostMayDropItsLastReferenceInACallback) {
   EXPECT_EQ(builder, nullptr);
 }
 
-// --- Hosts that know MRPT alone ----------------------------------------------------------------
+// --- Hosts that use MRPT only ------------------------------------------------------------------
 
 TEST_P(BuilderInEitherMode, WhileUpdatingIsDisabledPacketsAreSkippedAndThePoseGoesOn) {
   const SyntheticRecording recording(0.4);
@@ -307,7 +307,7 @@ TEST_P(BuilderInEitherMode, ABadObservationInAFrameTakesNoOtherWithIt) {
 }
 
 TEST_P(BuilderInEitherMode, LogsChoicesOfOptionsAndOnceRoundedPoints) {
-  for (const bool rests : {false, true}) {  // by its poses: one camera alone sees no scene then
+  for (const bool rests : {false, true}) {  // if true, fixed poses: one camera sees no scene
     SyntheticRecording recording(1.5, rests ? 1 : 2);
     for (StampedPose& pose : recording.poses) {
       pose.T_world_rig.translation.x() = 5e6 + (rests ? 0 : pose.T_world_rig.translation.x());
@@ -354,7 +354,7 @@ std::string listed(const EventFusionOptions& options) {
 TEST(HostOptions, OfSectionsThePrefixSaysWhichAreOurs) {
   struct Row {
     const char* prefix;
-    const char* text;  // 9 is ours
+    const char* text;  // the value 9 belongs to our section
   };
   const Row rows[] = {
       {"front", "[dsi]\nmax_depth_m = x\n[camera]\nfps = x\n[front_dsi]\nmax_depth_m = 9 ; m\n"},

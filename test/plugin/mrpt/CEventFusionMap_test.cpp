@@ -61,7 +61,7 @@ void expectSamePoints(const CEventFusionMap& a, const CEventFusionMap& b) {
   expectSameBits(a.cloud().points(), b.cloud().points());
 }
 
-/// Made as MRPT's programs make their maps.
+/// Creates maps as MRPT's programs do.
 CMultiMetricMap mapsFrom(const std::string& ini) {
   registerClasses();
   mrpt::maps::TSetOfMetricMapInitializers list;
@@ -150,7 +150,7 @@ TEST(CEventFusionMap, AKeyframeThatMovesIsThatOfItsNewPose) {
     expected.insertKeyframe(keyframe);
   }
   Rigid3 far = T_world_ref;
-  far.translation.x() = 1e19;  // voxels have no numbers there
+  far.translation.x() = 1e19;  // so far away, voxels have no numbers
   const CEventFusionMap before = map;
   EXPECT_THROW(map.moveKeyframe(1, far), std::invalid_argument);
   expectSamePoints(map, before);
@@ -194,7 +194,7 @@ TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChangeWhichAClearedOneDoesA
 }
 
 TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
-  // No option is the default.
+  // Every option differs from its default.
   GlobalCloudOptions options = bigVoxels();
   options.voxel_size_m = 2;
   options.min_keyframes = 2;
@@ -221,7 +221,7 @@ TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
   expectSamePoints(*read, map);
 }
 
-/// As this program's earlier versions stored a map: without a consistency check, without sigmas.
+/// Stores a map as earlier versions of this program did: without a consistency check and sigmas.
 Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
   Bytes content;
   auto out = mrpt::serialization::archiveFrom(content);
@@ -237,11 +237,11 @@ Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
     out << *cloudOf(keyframe);
   }
   Bytes bytes = bytesOf(map);
-  constexpr std::size_t kVersionAt = sizeof("efm::CEventFusionMap");  // behind length and name
+  constexpr std::size_t kVersionAt = sizeof("efm::CEventFusionMap");  // after length and name
   bytes.resize(kVersionAt);
   bytes.push_back(version);
   bytes.insert(bytes.end(), content.begin(), content.end());
-  bytes.push_back(0x88);  // MRPT's end of an object
+  bytes.push_back(0x88);  // MRPT's mark for the end of an object
   return bytes;
 }
 
@@ -271,7 +271,7 @@ TEST(CEventFusionMap, EarlierVersionsAreReadLaterAndDamagedOnesAreErrors) {
 TEST(CEventFusionMap, IsDrawnInColoursUpToTheNinetyFifthPercentile) {
   StoredKeyframe keyframe;
   std::vector<ViewPoint> points;
-  for (int i = 0; i < 40; ++i) {  // each in a voxel of its own
+  for (int i = 0; i < 40; ++i) {  // one voxel per point
     points.push_back({{static_cast<float>(i), 2, 3}, static_cast<float>(i + 1)});
   }
   keyframe.points = std::make_shared<std::vector<ViewPoint>>(points);
@@ -286,7 +286,7 @@ TEST(CEventFusionMap, IsDrawnInColoursUpToTheNinetyFifthPercentile) {
     const auto colour = drawn->getPointColor(i);
     EXPECT_EQ(point.y, 2);
     EXPECT_EQ(point.z, 3);
-    const auto expected = mrpt::img::colormap(mrpt::img::cmJET,  // the 38th of 40 is the scale
+    const auto expected = mrpt::img::colormap(mrpt::img::cmJET,  // value 38 of 40 is the scale
                                               std::min(1.0F, (point.x + 1) / 38));
     EXPECT_EQ(colour.R, expected.R) << point.x;
     EXPECT_EQ(colour.B, expected.B) << point.x;

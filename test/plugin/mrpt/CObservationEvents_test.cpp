@@ -59,14 +59,14 @@ TEST(CObservationEvents, IsTheSameAfterAnArchive) {
   for (const EventCompression compression : {EventCompression::kNone, EventCompression::kZstd}) {
     packet.compression = compression;
     expectSame(*objectFrom<CObservationEvents>(bytesOf(packet)), packet);
-    std::swap(packet.events[3], packet.events[70]);  // their order stays
+    std::swap(packet.events[3], packet.events[70]);  // the order of the events is kept
   }
   CObservationEvents empty;
   empty.timestamp = mrptTimeFrom(0);
   expectSame(*objectFrom<CObservationEvents>(bytesOf(empty)), empty);
 }
 
-/// Times as recordings have them, and any others.
+/// Generates times of real recordings and any other times.
 rc::Gen<std::int64_t> someTime() {
   return rc::gen::oneOf(rc::gen::inRange<std::int64_t>(kTodayNs, kTodayNs + 10'000'000),
                         rc::gen::map(rc::gen::inRange<std::int64_t>(0, 10'000),
@@ -90,7 +90,7 @@ RC_GTEST_PROP(EventEncoding, AnyEventsAreTheSameAfterEncoding, ()) {
 
 RC_GTEST_PROP(EventEncoding, AnyBytesAreEventsOrAnError, ()) {
   auto bytes = *rc::gen::arbitrary<Bytes>();
-  if (*rc::gen::arbitrary<bool>()) bytes.insert(bytes.begin(), {1, 1});  // a header that is right
+  if (*rc::gen::arbitrary<bool>()) bytes.insert(bytes.begin(), {1, 1});  // a valid header
   const auto count =
       *rc::gen::oneOf(rc::gen::inRange<std::size_t>(0, 20), rc::gen::arbitrary<std::size_t>());
   try {
@@ -104,7 +104,7 @@ TEST(EventEncoding, AShortStepOfWholeMicrosecondsTakesAByte) {
   std::vector<Event> events;
   events.reserve(80);
   for (int i = 0; i < 80; ++i) events.push_back({kTodayNs + 63'000 * i, 0, 0, false});
-  // encoding, tick, first time; steps; columns; polarities
+  // bytes of encoding, tick and first time; steps; columns; polarities
   EXPECT_EQ(encodeEvents(events).size(), 10 + 79 + 4 * 80 + 10);
   EXPECT_LT(encodeEvents(events, EventCompression::kZstd).size(), 60U) << "the same ones";
 }
@@ -126,11 +126,11 @@ TEST(CObservationEvents, AnyChangedByteIsAnErrorOrChangesNothing) {
       ++errors;
     }
   }
-  // MRPT also finds a class whose namespace it does not know.
+  // MRPT also finds a class if the namespace in its name is unknown.
   EXPECT_EQ(errors, static_cast<int>(bytes.size() - std::string("efm").size()));
 }
 
-/// Where the content's size stands: behind the length of the class's name, the name, the version.
+/// Position of the content's size: after the length of the class's name, the name and the version.
 constexpr std::size_t kSizeAt = 1 + sizeof("efm::CObservationEvents") - 1 + 1;
 
 TEST(CObservationEvents, DamageIsAnErrorThatNamesThePacket) {
@@ -192,8 +192,8 @@ TEST(CObservationEvents, IsExportedAsALineWithItsEvents) {
 using mrpt::opengl::CPointCloudColoured;
 using mrpt::opengl::CSetOfObjects;
 
-/// 240 x 180 pixels, f = 200 and 150: a line of brighter events on the left, of darker ones on the
-/// right.
+/// Returns a packet of 240 x 180 pixels, f = 200 and 150: a line of brighter events on the left, a
+/// line of darker events on the right.
 CObservationEvents twoLines() {
   CObservationEvents packet;
   packet.camera = {240, 180, 200, 150, 119.5, 89.5, DistortionModel::kNone, {}};
@@ -212,7 +212,7 @@ CPointCloudColoured::Ptr pointsOf(const CObservationEvents& packet) {
 TEST(EventDrawing, AnEventIsAPointOnTheImagePlaneOfItsCameraInTheColourOfItsPolarity) {
   CObservationEvents packet = twoLines();
   packet.camera_pose = mrpt::poses::CPose3D(1, 2, 3, 0.1, 0.2, 0.3);
-  for (const bool calibrated : {true, false}) {  // otherwise the focal length is the width
+  for (const bool calibrated : {true, false}) {  // otherwise the width is the focal length
     if (!calibrated) packet.camera = {240, 180, 0, 0, 0, 0, DistortionModel::kNone, {}};
     const double fx = calibrated ? 200 : 240;
     const double fy = calibrated ? 150 : 240;
@@ -226,7 +226,7 @@ TEST(EventDrawing, AnEventIsAPointOnTheImagePlaneOfItsCameraInTheColourOfItsPola
       EXPECT_EQ(points->getPointColor(i).G, 0);
       EXPECT_EQ(points->getPointColor(i).B, i == 0 ? 0 : 220);
     }
-    // From the camera to each corner of the image, and around it.
+    // Lines go from the camera to each corner of the image, and around the image.
     const auto camera = packet.getVisualization()->getByClass<CSetOfObjects>();
     EXPECT_LT(mrpt::poses::CPose3D(camera->getPose()).distanceTo(packet.camera_pose), 1e-6);
     EXPECT_NEAR(camera->getPose().yaw, 0.1, 1e-6);

@@ -20,7 +20,7 @@ namespace efm {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The object as an archive of MRPT stores it.
+/// Returns the object as an archive of MRPT stores it.
 template <typename Object>
 Bytes bytesOf(const Object& object) {
   Bytes bytes;
@@ -29,7 +29,7 @@ Bytes bytesOf(const Object& object) {
   return bytes;
 }
 
-/// The object by its class's name, as from a rawlog.
+/// Creates an object by its class name, like an object of a rawlog.
 template <typename Object>
 std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
   registerClasses();
@@ -37,7 +37,7 @@ std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
   return std::dynamic_pointer_cast<Object>(archive.ReadObject());
 }
 
-/// A packet of events as in a rawlog.
+/// Returns a packet of events as in a rawlog.
 inline CObservationEvents::Ptr observationOf(const EventPacket& packet) {
   auto observation = CObservationEvents::Create();
   observation->sensorLabel = "cam" + std::to_string(packet.camera);
@@ -50,7 +50,7 @@ inline CObservationEvents::Ptr observationOf(const EventPacket& packet) {
   return observation;
 }
 
-/// A pose with its noise as a covariance.
+/// Returns a pose; its covariance is the stated noise.
 inline mrpt::obs::CObservation::Ptr observationOf(const PoseSample& pose) {
   auto observation =
       std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(poseObservation(pose));
@@ -61,7 +61,7 @@ inline mrpt::obs::CObservation::Ptr observationOf(const PoseSample& pose) {
   return observation;
 }
 
-/// The samples of the recording as in a rawlog.
+/// Returns the samples of the recording as in a rawlog.
 inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(const Samples& samples) {
   std::vector<mrpt::obs::CObservation::Ptr> observations;
   for (const Sample& sample : samples) {
@@ -83,7 +83,7 @@ inline void expectSameBits(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr
   EXPECT_TRUE(test::sameBits(*a, *b));
 }
 
-/// The same points up to a distance, with the same support.
+/// Expects points with the same support, at most a distance apart.
 inline void expectNear(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr& b,
                        double tolerance_m) {
   ASSERT_EQ(a->size(), b->size());

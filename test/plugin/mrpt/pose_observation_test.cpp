@@ -64,7 +64,7 @@ Eigen::Vector3d drawn(std::mt19937& random) {
   return {x, y, normal(random)};
 }
 
-/// A random pose.
+/// Returns a random pose.
 /// @param from_vertical if not 0, the standard deviation of the pitch from 90 degrees, where MRPT's
 /// angles are singular.
 Rigid3 randomPose(std::mt19937& random, double from_vertical) {
@@ -99,7 +99,7 @@ TEST(MrptPoseOf, IsTheSameAfterARoundTripAndAfterAnArchive) {
   }
 }
 
-/// x, y, z, yaw, pitch and roll, as MRPT has them.
+/// Returns x, y, z, yaw, pitch and roll, in MRPT's order.
 Vector6d coordinatesOf(const Rigid3& T_a_b) {
   const mrpt::poses::CPose3D pose = mrptPoseFrom(T_a_b);
   Vector6d coordinates;
@@ -118,7 +118,7 @@ TEST(MrptPoseOf, ACovarianceIsThatOfManySmallMotions) {
     T_a_b.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
                      Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
                      Eigen::AngleAxisd(2.5 * share(random), Eigen::Vector3d::UnitX());
-    Matrix6d root;  // motions are this times standard normal numbers
+    Matrix6d root;  // a motion is this matrix times standard normal numbers
     for (int column = 0; column < 6; ++column) {
       root.col(column) << 1e-3 * drawn(random), 1e-4 * drawn(random);
     }
@@ -144,7 +144,7 @@ TEST(MrptPoseOf, ACovarianceIsThatOfManySmallMotions) {
     EXPECT_LT(angleBetween(rigidFrom(estimate.mean), T_a_b), 1e-12);
     for (int i = 0; i < 6; ++i) {
       for (int j = 0; j < 6; ++j) {
-        // A mean of 4000 products is known to 1.6 % of both deviations: five times that.
+        // The mean of 4000 products has an error of 1.6 to 2.2 % of both deviations: 5 times that.
         EXPECT_NEAR(squares(i, j) / kDraws, found(i, j),
                     0.11 * std::sqrt(found(i, i) * found(j, j)))
             << "pitch " << pitch << ", element " << i << ", " << j;
@@ -192,7 +192,7 @@ TEST(DeadReckoning, ComposesMovementsInSpace) {
   movement.poseChange.mean = mrpt::poses::CPose3D(0, 0, 2, 0, 0, kQuarterTurn);
   reckoning.poseAfter(CActionCollection(movement), {});
   const PoseSample pose = poseIn(reckoning.poseAfter(CActionCollection(movement), {}));
-  // Rolled by a quarter turn, up is where -y was.
+  // After a roll of 90 degrees, up is along the former -y.
   EXPECT_LT((pose.T_world_body.translation - Eigen::Vector3d(0, -2, 2)).norm(), 1e-12);
 }
 
@@ -235,7 +235,7 @@ TEST(PoseObservation, ItsNoiseIsTheStandardDeviationOverTheAxes) {
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->noise_m, 0.02, 1e-12);
   EXPECT_NEAR(noise->noise_rad, 0.003, 1e-12);
-  for (const int i : {0, 3}) {  // one of both may be 0
+  for (const int i : {0, 3}) {  // one of both deviations may be 0
     auto exact = robot;
     for (int axis = i; axis < i + 3; ++axis) exact.pose.cov(axis, axis) = 0;
     ASSERT_TRUE(efm::poseIn(exact)->noise);

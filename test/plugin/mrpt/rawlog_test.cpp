@@ -36,9 +36,9 @@ using testing::Not;
 using testing::StartsWith;
 using Observations = std::vector<CObservation::Ptr>;
 
-/// What a rawlog holds, and its error, if there is one.
+/// The contents of a rawlog, and the error that ended the reading, if any.
 struct Contents {
-  std::vector<std::vector<Event>> events{2};  // of each camera
+  std::vector<std::vector<Event>> events{2};  // per camera
   std::vector<PoseSample> poses;
   std::vector<std::string> others;
   std::string error;
@@ -73,7 +73,7 @@ Contents read(const std::filesystem::path& file) {
   return contents;
 }
 
-/// What the first entries hold.
+/// Returns the expected contents of the first entries.
 Contents contentsOf(const Observations& observations, std::size_t entries) {
   Contents contents;
   for (std::size_t i = 0; i < entries; ++i) {
@@ -96,14 +96,14 @@ void expectSame(const Contents& a, const Contents& b) {
   }
 }
 
-/// The number in "stopped at entry N of".
+/// Returns the number in "stopped at entry N of".
 std::size_t entryIn(const std::string& error) {
   const std::string begin = "stopped at entry ";
   EXPECT_THAT(error, StartsWith(begin));
   return error.size() > begin.size() ? std::stoul(error.substr(begin.size())) : 0;
 }
 
-/// One line without MRPT's decoration.
+/// Matches one line without MRPT's decoration.
 testing::Matcher<std::string> isPlain() {
   return AllOf(Not(HasSubstr("xception")), Not(HasSubstr("Location")), Not(HasSubstr("Message")),
                Not(HasSubstr("\n")), Not(EndsWith("unreadable")));
@@ -124,7 +124,7 @@ class Rawlog : public TemporaryFolder {
 
   void writeBytes(const std::string& bytes) const { writeFile(file(), bytes); }
 
-  /// The uncompressed content.
+  /// Returns the uncompressed content.
   std::string plainContent() const {
     GzStream stream(file());
     std::string plain;
@@ -133,7 +133,7 @@ class Rawlog : public TemporaryFolder {
     return plain;
   }
 
-  /// Any objects, as other programs may store them.
+  /// Writes any objects, as other programs may store them.
   template <typename... Objects>
   void writeObjects(const Objects&... objects) const {
     GzStream stream(file(), GzStream::Mode::kWrite);
@@ -203,7 +203,7 @@ TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeI
   write(recorded);
   const std::string bytes = readText(file());
   std::size_t most = 0;
-  // Its last 8 bytes are gzip's checksum and size.
+  // The last 8 bytes are gzip's checksum and size.
   for (std::size_t size = 1; size < bytes.size();
        size +=
        size + 8 < bytes.size() ? std::min(1 + bytes.size() / 50, bytes.size() - 8 - size) : 1) {
@@ -223,11 +223,11 @@ TEST_F(Rawlog, IsKnownByTheNameOfItsFirstObject) {
   const auto sized = [](char length, std::size_t count) {
     return length + std::string(count, 'a');
   };
-  const std::string wide("\3\0\0\0abc", 7);  // as of old versions
+  const std::string wide("\3\0\0\0abc", 7);  // as in old versions
   const std::pair<std::string, const char*> rows[] = {
       {sized('\x83', 3), nullptr},
       {sized('\xf8', 120), nullptr},
-      {sized('\x83', 1), nullptr},  // truncated
+      {sized('\x83', 1), nullptr},  // a truncated name
       {std::string("\x8b") + "az09AZ_:<>,", nullptr},
       {wide, nullptr},
       {wide.substr(0, 2), nullptr},
@@ -280,7 +280,7 @@ TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
   EXPECT_THAT(error_of(folder()), EndsWith(": a folder: expected a file"));
   EXPECT_THAT(error_of("/dev/null"), EndsWith(": not a regular file"));
   EXPECT_THAT(error_of(folder() / "nowhere"), EndsWith(": no such file"));
-  // An entry begins with the length of its class's name, with the top bit set.
+  // An entry begins with the length of its class's name. The top bit of the length is set.
   for (const auto& [name, shown] :
        {std::pair<std::string, std::string>{"CNewObservation", "CNewObse"},
         {"C\x1b[2J", "C\\x1b[2J"}}) {
@@ -303,7 +303,7 @@ TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
 
 }  // namespace
 
-// Rawlogs of both kinds that MRPT wrote, through the program and through the builder.
+// Tests both kinds of rawlogs, written by MRPT, with the program and with the builder.
 
 namespace {
 
@@ -312,7 +312,7 @@ using mrpt::obs::CObservationRobotPose;
 using mrpt::obs::CRawlog;
 using mrpt::obs::CSensoryFrame;
 
-/// How a rawlog says where the rig is.
+/// The kind of pose information in a rawlog.
 enum class Says { kPoses, kOdometry, kMovements2d, kMovements3d };
 
 class RawlogKinds : public ProgramTest {
@@ -326,7 +326,7 @@ class RawlogKinds : public ProgramTest {
     ASSERT_TRUE(rawlog.saveToRawLogFile((folder() / name).string()));
   }
 
-  /// The position in the recording's plane: it moves along x alone.
+  /// Returns the position in the plane of the recording, which moves along x only.
   static mrpt::poses::CPose2D planar(const StampedPose& pose) {
     return {pose.T_world_rig.translation.x(), pose.T_world_rig.translation.y(), 0};
   }
@@ -339,7 +339,7 @@ class RawlogKinds : public ProgramTest {
     return odometry;
   }
 
-  /// Observations alone.
+  /// Returns a rawlog of observations only.
   CRawlog observationsOnly(Says says) const {
     CRawlog rawlog;
     std::size_t k = 0;
@@ -352,7 +352,7 @@ class RawlogKinds : public ProgramTest {
     return rawlog;
   }
 
-  /// Pairs of an action and a frame: the packets until a pose, and that pose.
+  /// Returns a rawlog of pairs: an action, and a frame with the packets until a pose and this pose.
   CRawlog pairs(Says says) const {
     CRawlog rawlog;
     auto frame = CSensoryFrame::Create();
@@ -390,7 +390,7 @@ class RawlogKinds : public ProgramTest {
   const SyntheticRecording recording;
 };
 
-/// @param a, b as map.pcd.
+/// @param a, b contents of map.pcd files.
 void expectNearPcd(const std::string& a, const std::string& b) {
   const std::vector<CloudPoint> points = parsePcd(a).points;
   const std::vector<CloudPoint> expected = parsePcd(b).points;

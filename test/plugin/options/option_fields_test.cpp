@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What holds for the line of every option.
+// Tests the properties that every option must have.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ struct NumberOf<std::optional<Value>> {
   using Type = Value;
 };
 
-/// The ends of a range, and the next values beyond them.
+/// Returns the ends of a range and the next values outside it.
 template <typename Value>
 struct Ends {
   std::vector<Value> allowed;
@@ -68,7 +68,7 @@ OptionError rejectionOf(const Options& options) {
   return {"", "", ""};
 }
 
-/// The numbers of a sentence: 1e6 of "1e6 (metres)", 10000 of "10,000,".
+/// Returns the numbers of a sentence: 1e6 of "1e6 (metres)", 10000 of "10,000,".
 std::vector<double> numbersIn(std::string_view sentence) {
   std::vector<double> numbers;
   for (const std::string_view word : splitWords(sentence)) {
@@ -95,7 +95,7 @@ void expectWordsToNameTheEnds(const Allowed& range) {
   }
 }
 
-/// Checks the limits of the lines that it visits.
+/// Checks the limits of each option that it visits.
 template <typename Options>
 struct LimitsOfLines {
   Options& options;
@@ -110,7 +110,7 @@ struct LimitsOfLines {
       expectWordsToNameTheEnds(range);
       const Field before = field;
       const Ends<Value> ends(range);
-      for (const Value value : ends.allowed) {  // another value may contradict it
+      for (const Value value : ends.allowed) {  // the value may contradict another option
         field = value;
         EXPECT_NE(rejectionOf(options).expected, range.expected) << key << " = " << value;
       }
@@ -141,7 +141,7 @@ TEST(OptionFields, TheEndsOfARangeAreAllowedAndTheNextValuesAreRejected) {
   DepthPairingOptions::fields(pairing, LimitsOfLines<DepthPairingOptions>{pairing, lines});
 }
 
-/// Values that differ from the defaults. Numbers are changed by a number.
+/// Values that differ from the defaults. `otherValue` changes numbers by adding to them.
 const std::map<std::string, std::string> kOtherValues = {
     {"calibration", "a.yaml"},
     {"hand_eye", "/b.yaml"},
@@ -169,7 +169,7 @@ std::string otherValue(const NamedOption& option) {
   if (const auto* flag = std::get_if<bool>(&option.value)) return *flag ? "false" : "true";
   if (const auto* whole = std::get_if<std::int64_t>(&option.value)) return textOf(*whole + 2);
   if (const auto* number = std::get_if<double>(&option.value)) return textOf(*number + 0.5);
-  return "3";  // auto
+  return "3";  // the option is auto
 }
 
 TEST(OptionFields, AnOptionReadsBackWhatItPrintsAndChangesNoOther) {
@@ -189,7 +189,7 @@ TEST(OptionFields, AnOptionReadsBackWhatItPrintsAndChangesNoOther) {
   }
 }
 
-/// Of options whose keys or units differ from those of their fields.
+/// Tests options whose keys or units differ from the fields' names or units.
 TEST(OptionFields, KeysReachTheirFields) {
 #define EFM_ROW(section, key, text, field, value)                                    \
   {                                                                                  \

@@ -116,7 +116,7 @@ TEST(OptionReader, AnErrorNamesTheLine) {
       {"[dsi\nnum_planes = 3\n", "rig.ini:1: '[dsi': expected"},
       {"[dsi]\nnum_planes = 3\n[rig]\n[dsi]\nnum_planes = 3\n",
        "rig.ini:5: [dsi] num_planes: given twice, first in line 2"},
-      // Former keys.
+      // Former keys have errors of their own.
       {"[fusion]\nrevote = true\n", "rig.ini:2: [fusion] revote: was removed with re-voting"},
       {"[fusion]\nrevote_power = 2\n", "rig.ini:2: [fusion] revote_power: was removed"},
       {"[keyframes]\nmin_visible_share = 1\n",
@@ -189,7 +189,7 @@ TEST(OptionReader, AnErrorSaysTheRangeOfAValueInTheUnitsOfTheFile) {
   }
   EXPECT_NO_THROW(
       optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
-  // No processor has both.
+  // No processor has both kernels.
   const std::string missing = isAvailable(VotingKernel::kNeon) ? "avx2" : "neon";
   EXPECT_THAT(errorOf("[performance]\nkernel = " + missing + "\n"),
               AllOf(StartsWith("rig.ini:2: [performance] kernel = " + missing + ": must be one"),
@@ -298,7 +298,7 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
   EXPECT_EQ(error("", {"refinement.max_points=7000", "dsi.num_planes=9"}),
             "--set refinement.max_points=7000: contradicts default: [refinement] max_map_points = "
             "6000, which must be from max_points to 1000000");
-  // Not the other limit, which is auto.
+  // The error does not name the other limit, which is auto.
   for (const char* const value : {"-3", "0", "0.0001", "0.001"}) {
     const std::string set = std::string("dsi.max_depth_m=") + value;
     EXPECT_EQ(error("", {set}), "--set " + set + ": must be finite and above 0.001");
@@ -312,13 +312,13 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
               "--set " + set + ": must be finite and above 0");
   }
   EXPECT_NO_THROW(optionsOf("[dsi]\nmax_depth_m = 0.0011\n"));
-  // What is not given has its default.
+  // An option that is not given has its default.
   EXPECT_EQ(error("", {"refinement.last_distance_px=0"}),
             "--set refinement.last_distance_px=0: must be above 0, at most 10000 (pixels)");
 }
 
 TEST(OptionReader, OneOfTwoLimitsMayBeChosenFromTheData) {
-  // Beyond the built-in values, which the other limit has until it is chosen.
+  // Outside the built-in value of the other limit, which holds until the limit is chosen.
   for (const char* const text : {"[dsi]\nmin_depth_m = 20\n", "[dsi]\nmax_depth_m = 0.1\n",
                                  "[keyframes]\npolicy = baseline\nwindow_s = 0.01\n"}) {
     EXPECT_NO_THROW(optionsOf(text)) << text;

@@ -73,7 +73,7 @@ TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
       {"noise_m=much", "noise_m = much: must be a number, 0 to 1000 (metres)"},
       {"drift=nan", "drift = nan: must be a number"},
       {"keyframe_start_s=soon", "must be a time in seconds"},
-      {"keyframe_start_s=4611686018.427387903", "within 4.6e9 s of 0"},  // half of the largest
+      {"keyframe_start_s=4611686018.427387903", "within 4.6e9 s of 0"},  // half of the largest time
       {"keyframe_start_s=-4611686018.427387903", "within 4.6e9 s of 0"},
       {"seed=-2", "seed = -2: must be a whole number from 0"},
       {"seed=1.5", "seed = 1.5: must be a whole number from 0"},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A mapping program that has MRPT alone: it includes no header of this project and is not linked to
-// it. Loads the plugin, makes everything by name, plays a rawlog and saves the map.
+// A mapping program that uses MRPT only: it neither includes a header of this project nor links
+// its libraries. It loads the plugin, creates all objects by name, plays a rawlog and saves the
+// map.
 //
 //     mrpt_host PLUGIN.so CONFIG.ini PREFIX RECORDING.rawlog OUT
 //

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// MRPT's programs, and programs of others, with the plugin. First mrpt_host.cpp, which has MRPT
-// alone.
+// Tests MRPT's programs and other programs with the plugin. The first is mrpt_host.cpp, which uses
+// MRPT only.
 #include <gmock/gmock.h>
 #include <mrpt/obs/CRawlog.h>
 
@@ -63,7 +63,7 @@ TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
 
   ASSERT_EQ(result.status, 0) << result.err;
   expectTheMapOfEventFusion();
-  // Bit for bit.
+  // The maps are equal bit for bit.
   CEventFusionMapBuilder builder;
   mrpt::obs::CRawlog rawlog;
   ASSERT_TRUE(rawlog.loadFromRawLogFile((folder() / "data.rawlog").string()));
@@ -77,7 +77,7 @@ TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
 
 }  // namespace
 
-// MRPT's observations2map builds our map from the simplemap that `event-fusion map` wrote.
+// Tests that MRPT's observations2map builds our map from the simplemap of `event-fusion map`.
 
 namespace {
 
@@ -107,7 +107,7 @@ TEST_F(Observations2map, BuildsTheMapThatEventFusionWrote) {
 
 }  // namespace
 
-// MRPT's rawlog-edit on our rawlogs, with the plugin.
+// Tests MRPT's rawlog-edit with the plugin on our rawlogs.
 
 namespace {
 
@@ -168,7 +168,7 @@ namespace {
 
 class PclHost : public ProgramTest {
  protected:
-  /// The number after a name in the program's output.
+  /// Returns the number after a name in the program's output.
   static double numberAfter(const std::string& text, const std::string& name) {
     const std::size_t at = text.find(name + ": ");
     EXPECT_NE(at, std::string::npos) << name;

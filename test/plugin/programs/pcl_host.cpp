@@ -3,7 +3,7 @@
 //
 //     pcl_host CONFIG.ini RECORDING.rawlog
 //
-// prints what each of them found.
+// prints the result of each class.
 
 #define PCL_NO_PRECOMPILE  // before PCL: its templates are compiled for the points of a map
 

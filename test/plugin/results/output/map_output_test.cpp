@@ -27,7 +27,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// 4 x 3 pixels, one of which has a depth.
+/// Returns a keyframe of 4 x 3 pixels. One pixel has a depth.
 KeyframeDepthMap smallKeyframe(std::int64_t t_ref_ns) {
   KeyframeDepthMap keyframe;
   keyframe.window = {t_ref_ns - 10, t_ref_ns + 10, t_ref_ns};
@@ -72,7 +72,7 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
 TEST_F(MapOutputTest, OfAKeyframeThatCannotBeWrittenNothingStays) {
   const auto keyframe = folder() / "out" / "keyframes" / "1.000000000";
   MapOutput output(folder() / "out", OutputKind::kMap, {});
-  std::filesystem::create_directories(keyframe / "points.png");  // where a later file belongs
+  std::filesystem::create_directories(keyframe / "points.png");  // in the place of a later file
   std::filesystem::create_directories(keyframe / "depth.png");
   EXPECT_ANY_THROW(output.writeKeyframe(smallKeyframe(1'000'000'000)));
   for (const auto& entry : std::filesystem::directory_iterator(keyframe)) {
@@ -88,7 +88,7 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   const auto keyframes = folder() / "keyframes";
   std::ofstream(folder() / "notes.txt") << "mine";
   std::ofstream(keyframes / "1.000000000" / "notes.txt") << "mine";
-  std::filesystem::create_directory(keyframes / "2");  // not as a time is written here
+  std::filesystem::create_directory(keyframes / "2");  // this program writes times in another form
   std::ofstream(keyframes / "2" / "depth.tiff") << "mine";
   std::filesystem::create_directory(folder() / "elsewhere");
   std::ofstream(folder() / "elsewhere" / "depth.tiff") << "mine";
@@ -148,7 +148,7 @@ TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
   EXPECT_FALSE(result->isOf({"a"}));
   expectFiles(false, true);
   writeMap();
-  expectFiles(false, true);  // a run without a report leaves it, and nothing else
+  expectFiles(false, true);  // a run without a report leaves only this file
   EXPECT_FALSE(exists(mark));
   EXPECT_FALSE(exists(folder() / "keyframes"));
   writeMap("{}");
@@ -248,7 +248,7 @@ TEST_F(NpyFileTest, LeavesNothingWithoutFinish) {
                std::runtime_error);
 }
 
-/// As on a full disk: no file of this process grows beyond a size.
+/// Limits the size of this process's files, like a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -269,7 +269,7 @@ class FileSizeLimit {
 };
 
 TEST_F(NpyFileTest, ThatDoesNotFitTheDiskIsAnErrorAndLeavesNothing) {
-  for (const int side : {8, 400}) {  // written at the end, and at once
+  for (const int side : {8, 400}) {  // small data are written at the end, large data at once
     const FileSizeLimit limit(200);
     const ReferenceView view{side, side, 1, 1, 0, 0};
     const std::vector<float> plane(view.pixels(), 1.5F);
@@ -287,7 +287,7 @@ KeyframeDepthMap keyframeAt(std::int64_t t_ref_ns) {
   return keyframe;
 }
 
-/// Writes nothing before it is opened.
+/// A writer that waits until the gate is opened.
 struct Gate {
   std::promise<void> promise;
   std::shared_future<void> opened = promise.get_future().share();

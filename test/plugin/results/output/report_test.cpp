@@ -217,7 +217,7 @@ TEST(Summary, MeasuresOfTheMapAreItsBoxAndThePosesShift) {
   EXPECT_EQ(extent->min_m, Eigen::Vector3d(0, 4, -3));
   EXPECT_EQ(extent->max_m, Eigen::Vector3d(2, 6, -2));
 
-  // 2001 points along x, 1 m apart; on y and z, one in a thousand lies far away.
+  // 2001 points along x, 1 m apart. One point in a thousand lies far away on y and z.
   std::vector<CloudPoint> points;
   for (int i = 0; i <= 2000; ++i) {
     const bool is_far = i == 700 || i == 1400;
@@ -242,7 +242,7 @@ TEST(Summary, MeasuresOfTheMapAreItsBoxAndThePosesShift) {
   EXPECT_DOUBLE_EQ(shift.median_m, 1);
   EXPECT_DOUBLE_EQ(shift.max_m, 5);
   EXPECT_DOUBLE_EQ(shift.median_rad, 0);
-  EXPECT_NEAR(shift.max_rad, 0.3, 1e-12);  // rounding
+  EXPECT_NEAR(shift.max_rad, 0.3, 1e-12);  // accuracy of rounding
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ using testing::HasSubstr;
 
 const cv::Vec3b kRed(0, 0, 255);
 
-/// A plot from 0 to 1 on both axes.
+/// Returns a plot from 0 to 1 on both axes.
 CurvePlot plotOf(const Curve& curve) {
   CurvePlot plot;
   plot.x = {"x", AxisScale::kLinear, 0, 1};

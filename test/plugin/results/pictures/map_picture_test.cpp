@@ -15,13 +15,13 @@
 namespace efm {
 namespace {
 
-/// Relative luminance as in sRGB, without its curve: enough to compare lightness.
+/// Returns relative luminance as in sRGB, but linear: sufficient to compare lightness.
 double lightness(const PointColour& colour) {
   return 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2];
 }
 
 TEST(ColoursByHeight, HigherIsBrighterAndOutliersDoNotWidenTheRange) {
-  // 101 points along -y, which is up; then the same with an outlier far below and one far above.
+  // 101 points along -y, which is up; then also an outlier far below and an outlier far above.
   std::vector<CloudPoint> points;
   for (int i = 0; i <= 100; ++i) points.push_back({{5.0 * i, -0.1 * i, 1}, 1, 1});
   const auto colours = coloursByHeight(*mapCloudOf(points, 0.01), -Eigen::Vector3d::UnitY());
@@ -44,7 +44,7 @@ TEST(ColoursByHeight, HigherIsBrighterAndOutliersDoNotWidenTheRange) {
 }
 
 TEST(DepthPicture, RunsFromRedNearToBlueFarOnWhite) {
-  const cv::Mat1f depth = (cv::Mat1f(1, 4) << 1, 4, 0, 1.6F);  // 1/1.6 is half way
+  const cv::Mat1f depth = (cv::Mat1f(1, 4) << 1, 4, 0, 1.6F);  // 1/1.6 is halfway
   const cv::Mat3b picture = depthPicture(depth, {1.0, 4.0, 10, PlaneSpacing::kInverse});
   const cv::Vec3b near_bgr = picture(0, 0);
   const cv::Vec3b far_bgr = picture(0, 1);
@@ -58,7 +58,7 @@ TEST(DepthPicture, RunsFromRedNearToBlueFarOnWhite) {
 
 double lightness(const cv::Vec3b& bgr) { return 0.114 * bgr[0] + 0.587 * bgr[1] + 0.299 * bgr[2]; }
 
-/// In grey print depths must differ from each other and from the paper.
+/// In grey print, depths must differ from each other and from the paper.
 TEST(DepthFigure, IsReadableInGreyAndShowsTheConfidenceWithoutDepth) {
   DepthMap map;
   map.depth = cv::Mat1f::zeros(180, 240);
@@ -84,7 +84,7 @@ TEST(DepthFigure, IsReadableInGreyAndShowsTheConfidenceWithoutDepth) {
   EXPECT_EQ(depthFigure(map, {1.0, 4.0, 10}).cols, 1280) << "not enlarged";
 }
 
-/// Its first and its last colour from left to right.
+/// Returns the first and the last colour from left to right.
 std::pair<cv::Vec3b, cv::Vec3b> endsOf(const cv::Mat3b& bar) {
   std::vector<cv::Vec3b> colours;
   for (int x = 0; x < bar.cols; ++x) {
@@ -103,7 +103,7 @@ TEST(ColourBar, RunsFromTheColourOfItsLowEndToThatOfItsHighEnd) {
     const auto [first, last] = endsOf(drawBar({2, 8}, palette, "m", 400));
     EXPECT_LT(cv::norm(first, ends(0, 0)), 12);
     EXPECT_LT(cv::norm(last, ends(0, 1)), 12);
-    // The same colours as the image beside it.
+    // The bar has the colours of the image beside it.
     const cv::Mat3b picture =
         drawValues({"", (cv::Mat1f(1, 2) << 2, 8), {2, 8}, "m", palette, 320});
     EXPECT_LT(cv::norm(picture(80, 80), ends(0, 0)), 12);
@@ -120,7 +120,7 @@ TEST(ConfidencePicture, IsBrightWhereSmallAndDarkWhereLarge) {
 }
 
 TEST(EventPicture, BrighterIsRedDarkerBlueAndStrongerDarker) {
-  cv::Mat_<cv::Vec2i> counts(1, 4);  // darker, brighter
+  cv::Mat_<cv::Vec2i> counts(1, 4);  // counts of darker, brighter events
   counts << cv::Vec2i(0, 1), cv::Vec2i(1, 0), cv::Vec2i(0, 3), cv::Vec2i(0, 0);
   const cv::Mat3b picture = eventPicture(counts);
   EXPECT_EQ(picture(0, 0), cv::Vec3b(120, 120, 255));
@@ -131,7 +131,7 @@ TEST(EventPicture, BrighterIsRedDarkerBlueAndStrongerDarker) {
 
 constexpr double kVoxel = 0.01;  // metres
 
-/// Cameras that look along +y of a world with z up, on a line along x.
+/// Returns cameras on a line along x. They look along +y in a world with z up.
 std::vector<StampedPose> lookingAlongY(int count) {
   Eigen::Matrix3d R_world_cam;  // columns: x right, y down, z forward
   R_world_cam << 1, 0, 0,       //
@@ -144,7 +144,7 @@ std::vector<StampedPose> lookingAlongY(int count) {
   return trajectory;
 }
 
-/// A box of points: 4 m along x, 2 m along y, 1 m high.
+/// Returns a box of points: 4 m along x, 2 m along y, 1 m high.
 std::vector<CloudPoint> box() {
   std::vector<CloudPoint> points;
   for (int x = 0; x <= 40; ++x) {
@@ -158,7 +158,7 @@ std::vector<CloudPoint> box() {
 TEST(Upward, IsAcrossTheLevelAxesOfTheCameras) {
   EXPECT_LT((upwardOf(lookingAlongY(5)) - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
   EXPECT_EQ(upwardOf({}), Eigen::Vector3d::UnitZ());
-  // The pinhole convention: a world that is the first camera's frame has y down.
+  // In the pinhole convention, a world that is the first camera's frame has y down.
   EXPECT_LT((upwardOf({{0, Rigid3{}}, {1, Rigid3{}}}) + Eigen::Vector3d::UnitY()).norm(), 1e-9);
 }
 
@@ -171,7 +171,7 @@ TEST(MapLayout, FarOutliersDoNotChangeTheScale) {
 }
 
 TEST(MapPicture, HasTheMapFromAboveAndFromTheSideTheTrajectoryAndALegend) {
-  // Cameras that go right and look at a box, of which the picture has a corner missing.
+  // The cameras move right and look at a box. A corner of the box is missing in the map.
   std::vector<CloudPoint> points = box();
   points.erase(std::remove_if(points.begin(), points.end(),
                               [](const CloudPoint& point) {
@@ -204,7 +204,7 @@ cccbbbbbbbbbbbbbbb
 ##  +     bccgyyrr
 174531 px at 640.8, 795.6
 )");
-  // The same in a world with y down, and where cameras look back.
+  // The picture is the same in a world with y down, and in a world rotated by 180 degrees about z.
   for (const Eigen::Vector3d& turn : {Eigen::Vector3d(0.5 * kPi, 0, 0), {0, 0, kPi}}) {
     const Rigid3 T_other_world{rotationBy(turn), {0, 0, 0}};
     std::vector<CloudPoint> other = points;
@@ -216,7 +216,7 @@ cccbbbbbbbbbbbbbbb
     const cv::Mat difference = cv::Mat(turned != picture).reshape(1);
     EXPECT_LT(cv::countNonZero(difference), 0.01 * static_cast<double>(difference.total()));
   }
-  // A trajectory alone, and a single point.
+  // A trajectory without points, and a single point.
   EXPECT_EQ(test::sketchOf(drawMap(MapCloud(), trajectory, kVoxel), 100), R"(
 +
 

@@ -8,7 +8,7 @@
 
 namespace efm::test {
 
-/// The letter of a colour: # + . from dark to light grey, r y g c b m.
+/// Returns the letter of a colour: # + . from dark to light grey, r y g c b m.
 inline char letterOf(const cv::Scalar& bgr) {
   const auto [low, high] = std::minmax({bgr[0], bgr[1], bgr[2]});
   if (high - low < 40) return high < 110 ? '#' : high < 200 ? '+' : '.';
@@ -17,9 +17,9 @@ inline char letterOf(const cv::Scalar& bgr) {
   return " bgcrmy"[bits];
 }
 
-/// A picture as lines of letters, one for each block of pixels: its mean colour without the white,
-/// blank where hardly anything is drawn. The last line has the number of all pixels that are not
-/// white and their mean position, so that a small shift shows.
+/// Returns a picture as lines of letters. A letter is the mean colour of a block of pixels without
+/// its white pixels; a block with almost no drawing is blank. The last line has the number of all
+/// pixels that are not white and their mean position, so that a small shift shows.
 inline std::string sketchOf(const cv::Mat3b& picture, int block_px) {
   std::string sketch = "\n";
   double ink = 0;

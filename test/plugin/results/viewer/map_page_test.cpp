@@ -42,7 +42,7 @@ TEST(Base64, IsThatOfTheStandard) {
   EXPECT_EQ(base64("\xFB\xFF\xBF"), "+/+/");
 }
 
-/// Far from the origin of the world, as in a town's coordinates.
+/// The points are far from the world's origin, as in a town's coordinates.
 TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
   const std::vector<CloudPoint> points = randomPoints(1000, {4e5, 5e6, 300});
   const MapCloud::ConstPtr cloud = mapCloudOf(points, 1e-4);
@@ -50,18 +50,18 @@ TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
   ASSERT_EQ(page.size(), points.size());
   EXPECT_NEAR(page.step_m().x(), 40.0 / 65535, 1e-5);
   EXPECT_EQ(page.thinned_m(), 0);
-  // Confidences are 1 to 1000: the lowest and the highest percent.
+  // Confidences are 1 to 1000: the range goes from the lowest to the highest percent.
   EXPECT_EQ(page.lowConfidence(), 10);
   EXPECT_EQ(page.highConfidence(), 990);
   std::set<std::size_t> found;
   for (std::size_t i = 0; i < page.size(); ++i) {
     const PagePoint quantised = page.at(i);
-    const CloudPoint& point = points[quantised.keyframe];  // a keyframe of its own each
+    const CloudPoint& point = points[quantised.keyframe];  // each point has its own keyframe
     found.insert(quantised.keyframe);
     EXPECT_EQ(quantised.support, std::min<std::uint32_t>(point.support, 255));
     for (int axis = 0; axis < 3; ++axis) {
       const double p = page.origin_m()[axis] + page.step_m()[axis] * quantised.cell[axis];
-      // Beside half a step: the digits of a float relative to the origin of the cloud.
+      // The error is half a step plus the digits of a float relative to the origin of the cloud.
       EXPECT_LE(std::abs(p - point.p_world[axis]), 0.5 * page.step_m()[axis] + 1e-5);
     }
     const double level = std::log(point.confidence / page.lowConfidence()) /
@@ -72,7 +72,7 @@ TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
 }
 
 TEST(PagePoints, AnyFirstPartCoversTheMap) {
-  std::vector<CloudPoint> line;  // sorted, as a map is
+  std::vector<CloudPoint> line;  // sorted like a map
   for (int i = 0; i < 100000; ++i) line.push_back({{0.01 * i, 0, 0}, 1.0F});
   const MapCloud::ConstPtr cloud = mapCloudOf(line, 0.01);
   const PagePoints page(*cloud, 0.01);
@@ -90,7 +90,7 @@ TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
   EXPECT_LE(page.size(), 1000U);
   EXPECT_GE(page.size(), 700U) << "not many fewer than there may be";
   EXPECT_GT(page.thinned_m(), 0.01);
-  // Of each cell the highest support, and of these the highest confidence.
+  // Each cell keeps the points with its highest support, and of these the highest confidence.
   std::map<std::tuple<double, double, double>, std::pair<std::uint32_t, float>> best;
   const auto cell_of = [&](const MapPoint& point) {
     const Eigen::Vector3d cell =
@@ -108,7 +108,7 @@ TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
   }
 }
 
-/// Eight corners: a cell has one of them or all, no number between.
+/// Eight corners: cells of any size keep one of the corners or all, no number between.
 TEST(PagePoints, ThinningEndsWhereNoCellGivesTheNumber) {
   std::vector<CloudPoint> corners;
   for (int i = 0; i < 8; ++i) corners.push_back({{i % 2 * 1.0, i / 2 % 2 * 1.0, i / 4 * 1.0}, 1});
@@ -185,7 +185,7 @@ TEST(KeyframePictures, JoinBlocksOfPixelsToTheNearestDepthAndTheSumOfEvents) {
   EXPECT_THAT(pictures.pictures().at(1).events, IsEmpty());
 }
 
-/// The data of a page by the id of their script element, read as a browser does.
+/// Returns the data of a page by the id of their script element, as a browser reads it.
 std::string dataOf(const std::string& page, const std::string& id) {
   const std::size_t tag = page.find("<script id=\"" + id + "\"");
   const std::size_t begin = page.find('>', tag) + 1;
