@@ -17,7 +17,7 @@ namespace efm {
 namespace {
 
 constexpr float kSigma_px = 1.5F;
-constexpr double kMinFraction = 1.0 / 99;  // of the range of planes: a step
+constexpr double kMinFraction = 1.0 / 99;  // the smallest step, of the range of planes
 
 /// Finds the peak of a sum of columns.
 class PeakFinder {
@@ -36,7 +36,7 @@ class PeakFinder {
     peak.at_end = before < 0 || after < 0;
     peak.position = static_cast<float>(plane + base_ * peakPosition(0, before, *top, after));
     peak.width_sq = static_cast<float>(base_ * base_) * peakWidthSquared(before, *top, after);
-    // From the largest distance to the smallest: each step adds the planes between.
+    // The distances decrease: each round adds the planes between two distances.
     float second = 0;
     int left = 0;
     int right = planes_;
@@ -53,7 +53,7 @@ class PeakFinder {
   }
 
  private:
-  /// Whether a step is more than a hundredth of the range: the parallax is small.
+  /// Returns whether a step is more than a hundredth of the range: the parallax is small.
   bool isWide() const { return step_planes_ > 1.001 * kMinFraction * (planes_ - 1); }
   static float maximumOf(const std::vector<float>& sum, int begin, int end) {
     return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
@@ -61,8 +61,8 @@ class PeakFinder {
 
   int planes_;
   double step_planes_;
-  /// Planes from the peak to the values that its parabola goes through. With over 800 planes, or
-  /// little parallax, the next ones differ by less than a step of their bytes.
+  /// Distance in planes from the peak to the other two values of its parabola. With over 800
+  /// planes, or little parallax, values on adjacent planes differ by less than one step of a byte.
   int base_;
 };
 
@@ -74,7 +74,7 @@ double planesPerStep(int planes, double range_px) {
   const double intervals = planes - 1;
   if (intervals < 2) return 1;
   const double step = intervals * std::clamp(kStepPx / range_px, kMinFraction, kMaxFraction);
-  // At least a plane, but less where planes are closer than a quarter of a pixel.
+  // At least one plane, but less if planes are closer than a quarter of a pixel.
   const double px_per_plane = range_px / intervals;
   return std::max(step, std::min(1.0, 4 * px_per_plane));
 }
@@ -105,10 +105,10 @@ std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
 
 namespace {
 
-/// Of the weight of other pixels by their distance.
+/// Sigma of the Gaussian weight of other pixels, by their distance.
 constexpr float kDistanceSigma_px = 2;
 
-/// The pixels around one pixel.
+/// The positions and weights of the pixels around one pixel.
 class Surroundings {
  public:
   void clear() {
@@ -121,11 +121,11 @@ class Surroundings {
     total_ += weight;
   }
 
-  /// The smallest position with at least half of the weight at or below it.
+  /// Returns the smallest position with at least half of the weight at or below it.
   float weightedMedian() { return smallestWith(0.5F * total_); }
 
-  /// Median distance from a position, the larger one of two. Positions are distances afterwards,
-  /// with equal weights.
+  /// Returns the median distance from a position (the larger of two middle distances). Afterwards,
+  /// the positions are distances with equal weights.
   float medianDistance(float from) {
     for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
     std::fill_n(weights_.begin(), size_, 1.0F);
@@ -133,7 +133,7 @@ class Surroundings {
   }
 
  private:
-  /// The smallest position with at least this weight at or below it.
+  /// Returns the smallest position with at least this weight at or below it.
   float smallestWith(float min_weight) {
     std::fill_n(below_.begin(), size_, 0.0F);
     ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
@@ -148,7 +148,7 @@ class Surroundings {
   const kernels::RankFunctions& ranks_ = kernels::rankFunctions(fastestKernel());
   Values positions_{}, weights_{}, below_{};
   std::size_t size_ = 0;
-  float total_ = 0;  // weight
+  float total_ = 0;  // sum of the weights
 };
 
 }  // namespace
@@ -191,7 +191,7 @@ constexpr double kMedianSteps = 10;      ///< Distance from the median that divi
 constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
 constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
 
-/// Confidence minus its Gaussian mean, over the mean confidence of the pixels that have any.
+/// Returns the confidence minus its Gaussian mean, divided by the mean of the confidences above 0.
 cv::Mat1f localContrast(const cv::Mat1f& confidence, int window) {
   cv::Mat1f surroundings;
   cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
@@ -208,8 +208,8 @@ cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
   return mask;
 }
 
-/// The distance where a peak of the keyframe ends: with a short baseline peaks are wide.
-/// @return index into `AggregatedPeak::second_peak`.
+/// Returns the distance where the peaks of the keyframe end: with a short baseline, peaks are wide.
+/// @return an index into `AggregatedPeak::second_peak`.
 std::size_t peakEnd(const std::vector<AggregatedPeak>& peaks, double step_planes) {
   if (peaks.empty()) return 0;
   std::vector<float> widths_sq;
@@ -220,10 +220,10 @@ std::size_t peakEnd(const std::vector<AggregatedPeak>& peaks, double step_planes
   return static_cast<std::size_t>(steps) - AggregatedPeak::kMinSteps;
 }
 
-/// Variance of a position, planes^2. It grows with the width of the peak and with the spread of the
-/// depths around; its minimum is about a tenth of a plane, squared. Fitted to the errors of the
-/// simulated presets up to VGA: on new seeds of these, 54 to 82 % of the depths lie within one
-/// standard deviation of the truth and 83 to 94 % within two.
+/// Returns the variance of a position, planes^2. It grows with the width of the peak and with the
+/// spread of the depths around it; its minimum is about (0.1 planes)^2. It is fitted to the errors
+/// of the simulated presets up to VGA: on new seeds of these presets, 54 to 82 % of the depths lie
+/// within one standard deviation of the truth and 83 to 94 % within two.
 double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
   constexpr double kMinSigma = 0.09;
   constexpr double kWidthTimesSpread = 0.0143;
@@ -253,7 +253,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
   const std::vector<LocalAgreement> around = localAgreement(
       candidates, positions, weights, static_cast<float>(kAgreementSteps * step_planes));
 
-  /// Local contrast, lowered for ambiguous peaks and disagreeing neighbours.
+  /// The local contrast, lowered for ambiguous peaks and disagreeing neighbours.
   const auto quality_of = [&](std::size_t i) {
     const double unambiguous =
         std::pow(std::max(0.0, 1.0 - peaks[i].second_peak[second]), kSteepness);
@@ -262,7 +262,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
            around[i].agreeing_fraction;
   };
   const bool has_inner_planes = planes.size() > 2;
-  // No depth can be told where all planes lie within a pixel of parallax.
+  // Depths are unobservable if all planes lie within a pixel of parallax.
   const bool all_alike = has_inner_planes && range_px < 1;
   cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());
   std::vector<PlanePosition> found;

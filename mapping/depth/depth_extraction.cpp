@@ -41,7 +41,7 @@ DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
 
 namespace {
 
-/// The confidence that becomes 255.
+/// Returns the confidence that becomes 255.
 double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
                std::optional<double> sequence_maximum) {
   if (option.level == WhiteLevel::kFixed) return option.fixed;
@@ -64,7 +64,7 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
   cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
                         options.threshold_kernel, -options.threshold_c);
   const SparseMask sparse(mask);
-  std::vector<float> positions(sparse.size());  // between planes
+  std::vector<float> positions(sparse.size());  // in planes, with a fraction
   sparse.forEach([&](std::size_t i, cv::Point at) {
     const int plane = peaks.plane(at);
     positions[i] =

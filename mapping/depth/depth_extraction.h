@@ -12,7 +12,7 @@
 
 namespace efm {
 
-/// How pixels and depths are selected from the DSI.
+/// The method that selects pixels and depths from the DSI.
 enum class ExtractionMethod {
   kPaper,  ///< Adaptive Gaussian thresholding and a median filter (Rebecq et al., IJCV 2018, 6.2).
   /// Depth from the summed columns of neighbouring pixels, kept where they agree. Needs the columns
@@ -32,7 +32,7 @@ enum class WhiteLevel {
 
 struct MaxConfidence {
   WhiteLevel level = WhiteLevel::kKeyframe;
-  double fixed = 0;  ///< With `kFixed`: finite and above 0.
+  double fixed = 0;  ///< White for `kFixed`, votes: finite and above 0.
 
   static MaxConfidence of(double votes) { return {WhiteLevel::kFixed, votes}; }
 };
@@ -40,23 +40,23 @@ struct MaxConfidence {
 struct DepthExtractionOptions {
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
   int threshold_kernel = 5;  ///< Side of the Gaussian window in pixels; odd, 3 to 255.
-  bool dilate = false;       ///< Grow the mask by its four neighbours: the paper's MF.
+  bool dilate = false;       ///< True: the mask grows to its four neighbours (the paper's MF).
 
-  // `kAggregated`. Both are fractions of the keyframe's mean confidence, so that one value suits
-  // all recordings.
+  // Options of `kAggregated`. Both are fractions of the keyframe's mean confidence, so that one
+  // value suits all recordings.
   /// Minimum local contrast of a pixel to be considered. Above 0.
   double min_local_contrast = 0.15;
-  /// Minimum quality of a pixel to be kept: local contrast, lowered where the peak is ambiguous or
+  /// Minimum quality of a pixel to be kept: local contrast, lowered if the peak is ambiguous or
   /// neighbours disagree. 0 or above; larger values keep fewer and more certain points. The default
-  /// is chosen by F1 over simulated scenes and a real one (docs/studies.md, section 12).
+  /// has the best F1 over simulated scenes and a real one (docs/studies.md, section 12).
   double min_quality = 0.05;
 
-  // `kPaper`.
-  /// C: minimum difference to the surroundings in grey values (of 255). -255 to 255.
+  // Options of `kPaper`.
+  /// C: minimum difference of a pixel from its surroundings, in grey values (of 255). -255 to 255.
   double threshold_c = 5;
   MaxConfidence max_confidence;
-  int median_size = 5;   ///< Side of the median window in pixels; odd, 1 (none) to 255.
-  bool subplane = true;  ///< Fit a parabola through the peak and its neighbours.
+  int median_size = 5;   ///< Side of the median window in pixels; odd, 1 (no filter) to 255.
+  bool subplane = true;  ///< True: a parabola is fitted through the peak and its neighbours.
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -75,9 +75,9 @@ struct DepthExtractionOptions {
   void validate() const;
 };
 
-/// What the DSI itself does not tell.
+/// Facts about a keyframe that the DSI does not contain.
 struct KeyframeFacts {
-  /// The value of `WhiteLevel::kSequence`; not given: the keyframe's maximum.
+  /// The value of `WhiteLevel::kSequence`. If it is not given, the keyframe's maximum is used.
   std::optional<double> sequence_maximum;
   /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
   double parallax_px_m = std::numeric_limits<double>::infinity();
@@ -86,15 +86,15 @@ struct KeyframeFacts {
 /// Selects the pixels with local contrast and finds the depth of each. `kAggregated`: see
 /// `extractAggregated`. `kPaper`:
 /// 1. c8 = round(255 c / max_confidence), clipped;
-/// 2. keep where c8 - round(gauss(c8)) > C;
-/// 3. position of the peak along the ray, between planes where `subplane` is set;
+/// 2. keep the pixel if c8 - round(gauss(c8)) > C;
+/// 3. position of the peak along the ray, between planes if `subplane` is set;
 /// 4. lower median of the positions of the mask's pixels in the window;
 /// 5. clear a frame of 2 pixels;
-/// 6. where `dilate` is set, see `dilate`.
+/// 6. if `dilate` is set, grow the mask: see `dilate`.
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options, const KeyframeFacts& facts = {});
 
-/// `ExtractionMethod::kPaper`: see `extractDepth`.
+/// Implements `ExtractionMethod::kPaper`: see `extractDepth`.
 DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
                         const DepthExtractionOptions& options,
                         std::optional<double> sequence_maximum = std::nullopt);

@@ -6,8 +6,8 @@
 namespace efm {
 
 SparseMask::SparseMask(const cv::Mat1b& mask) {
-  // Without a branch, which the processor would mispredict: each column is written, and the next
-  // one overwrites it unless the mask has it.
+  // This loop has no branch that the processor would mispredict: it writes each column, and the
+  // next column overwrites it unless the mask has the pixel.
   std::size_t count = 0;
   columns_.resize(static_cast<std::size_t>(cv::countNonZero(mask)) + 1);
   row_begin_.reserve(static_cast<std::size_t>(mask.rows) + 1);
@@ -29,7 +29,7 @@ constexpr int kFrame = 2;  ///< Pixels cleared at each side of the image.
 
 constexpr std::array<std::array<int, 2>, 4> kAdjacent{{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
 
-/// Whether an empty pixel copies from `a` rather than from `b`.
+/// Returns whether an empty pixel copies from `a` rather than from `b`.
 bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
   if (map.confidence(a) != map.confidence(b)) return map.confidence(a) > map.confidence(b);
   return map.depth(a) < map.depth(b);
@@ -81,7 +81,7 @@ DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& po
   return result;
 }
 
-// In place: filled pixels are not in the mask, so none is copied from.
+// This works in place: filled pixels are not in the mask, so they are never copied.
 void dilate(const SparseMask& sparse, const cv::Mat1b& mask, DepthMap& map) {
   map.confidence = map.confidence.clone();  // it is shared with the DSI's peaks
   const cv::Rect inner = insideFrame(mask.size());

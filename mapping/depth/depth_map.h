@@ -40,15 +40,15 @@ class SparseMask {
   std::vector<std::size_t> row_begin_;  // one more than rows
 };
 
-/// Finds the pixels of a sparse mask in the window of 9x9 pixels around a pixel, itself included.
-/// Remembers where the last window was: fast for pixels from left to right.
+/// Search for the pixels of a sparse mask in the window of 9x9 pixels around a pixel, itself
+/// included. It remembers the last window, so it is fast for pixels from left to right.
 class PixelNeighbours {
  public:
   static constexpr int kRadius_px = 4;
   static constexpr int kRows = 2 * kRadius_px + 1;
   static constexpr std::size_t kMaxPixels = kRows * kRows;
 
-  /// Gaussian weights by the square of the distance.
+  /// Gaussian weights; the index is the squared distance, pixels^2.
   using Weights = std::array<float, 2 * kRadius_px * kRadius_px + 1>;
   static Weights gaussian(float sigma_px) {
     Weights weights{};
@@ -61,7 +61,7 @@ class PixelNeighbours {
   /// @param mask outlives this object.
   explicit PixelNeighbours(const SparseMask& mask) : mask_(&mask) {}
 
-  /// Calls `visit(index, offset)` for each, row by row.
+  /// Calls `visit(index, offset)` for each pixel of the mask in the window, row by row.
   template <typename Visit>
   void forEach(cv::Point pixel, Visit visit) {
     if (pixel.y != last_.y || pixel.x < last_.x) {
@@ -89,22 +89,22 @@ class PixelNeighbours {
   std::array<std::size_t, kRows> begins_{};  // by row of the window
 };
 
-/// What became of the pixels with local contrast, which could have a depth.
+/// Counts of the pixels that have local contrast and so could have a depth.
 struct PixelCounts {
   std::uint64_t candidates = 0;
   std::uint64_t at_nearest = 0;   ///< The peak lies on the first plane: no depth.
   std::uint64_t at_farthest = 0;  ///< The peak lies on the last plane: no depth.
-  std::uint64_t ambiguous = 0;    ///< Below `min_quality`: no depth.
+  std::uint64_t ambiguous = 0;    ///< The quality is too low (`min_quality`): no depth.
 
   PixelCounts& operator+=(const PixelCounts& other);
 };
 
 /// A semi-dense depth map in the reference view.
 struct DepthMap {
-  cv::Mat1f depth;       ///< z-depth in metres; 0 where there is none.
-  cv::Mat1f confidence;  ///< The raw fused value at the peak, at every pixel except dilated ones.
-  /// Variance of inverse depth, 1/m^2: 0 where there is no depth, infinite where the peak is flat
-  /// or lies on the first or last plane.
+  cv::Mat1f depth;       ///< z-depth in metres; 0: no depth.
+  cv::Mat1f confidence;  ///< The raw fused value at the peak; dilated pixels copy it.
+  /// Variance of inverse depth, 1/m^2: 0 without a depth, infinite if the peak is flat or lies on
+  /// the first or the last plane.
   cv::Mat1f variance;
   PixelCounts pixels = {};  ///< `ExtractionMethod::kPaper` keeps every candidate.
 };
@@ -115,18 +115,18 @@ struct PlanePosition {
   double variance = 0;
 };
 
-/// The image without a frame of two pixels, which has no depths; may be empty.
+/// Returns the image without its frame of two pixels, which has no depths. May be empty.
 cv::Rect insideFrame(cv::Size size);
 
-/// The depth map of a mask's pixels inside the frame.
+/// Returns the depth map of a mask's pixels inside the frame.
 /// @param positions one per pixel of the mask.
-/// @param confidence of the whole view; shared, not copied.
+/// @param confidence of all pixels of the view; shared, not copied.
 DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& positions,
                     const cv::Mat1f& confidence, const DepthPlanes& planes);
 
 /// Grows the depths by a pixel, except into the frame: an empty pixel adjacent to pixels of the
-/// mask gets depth, confidence and variance of the most confident one (of equals, the nearer one).
-/// The paper's morphological filter (MF).
+/// mask gets depth, confidence and variance of the most confident of these pixels (of the nearer
+/// pixel if two are equal). This is the paper's morphological filter (MF).
 /// @param sparse the pixels of `mask`.
 void dilate(const SparseMask& sparse, const cv::Mat1b& mask, DepthMap& map);
 

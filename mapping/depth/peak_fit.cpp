@@ -9,7 +9,7 @@ namespace efm {
 namespace {
 
 /// A set of ranks below a limit with fast access to its k-th element: single ranks, and counts of
-/// 256 consecutive ones. A search starts where the last one ended, because neighbouring windows
+/// 256 consecutive ranks. A search starts where the last search ended, because neighbouring windows
 /// have similar medians.
 class RankSet {
  public:
@@ -29,7 +29,7 @@ class RankSet {
   }
   std::size_t size() const { return size_; }
 
-  /// @param k from 0, below `size()`.
+  /// Returns the k-th smallest rank. @param k from 0, below `size()`.
   std::size_t at(std::size_t k) {
     while (below_ > k) below_ -= by_256_[--here_];
     while (below_ + by_256_[here_] <= k) below_ += by_256_[here_++];
@@ -43,17 +43,17 @@ class RankSet {
   std::vector<std::uint16_t> by_256_;
   std::size_t size_ = 0;
   std::size_t here_ = 0;   // index into by_256_
-  std::size_t below_ = 0;  // ranks in the counts before it
+  std::size_t below_ = 0;  // ranks in the counts before `here_`
 };
 
-/// The pixels of one row that are in the window: [left, right) of those up to `end`.
+/// The pixels of one row that are in the window: [left, right). The row ends at `end`.
 struct RowWindow {
   std::size_t left = 0;
   std::size_t right = 0;
   std::size_t end = 0;
 };
 
-/// The windows around the pixels of row `y`, before the first of them.
+/// Makes the windows for row `y`, which begin left of its first pixel and are empty.
 void startRow(const SparseMask& mask, int y, int radius, std::vector<RowWindow>& rows) {
   rows.clear();
   const int last = std::min(mask.rows() - 1, y + radius);
@@ -109,7 +109,7 @@ namespace {
 /// 98 % within two, before the median filter, which halves the remaining errors.
 constexpr double kErrorOfWidth = 0.17;
 
-/// The negative second difference; 0 where a neighbour is missing.
+/// Returns the negative second difference; 0 if a neighbour is missing.
 template <typename Real>
 Real curvatureOf(float before, float peak, float after) {
   if (before < 0 || after < 0) return 0;
@@ -142,7 +142,7 @@ void RobustMaximum::add(double value) {
 
 std::optional<double> RobustMaximum::value() const {
   if (values_.empty()) return std::nullopt;
-  const std::size_t rank = (values_.size() * 95 + 99) / 100;  // rounded up, from 1
+  const std::size_t rank = (values_.size() * 95 + 99) / 100;  // rounded up; ranks begin at 1
   return values_[rank - 1];
 }
 

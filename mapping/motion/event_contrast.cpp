@@ -66,7 +66,7 @@ NearestDepths::NearestDepths(const cv::Mat1f& depth, double radius_px)
 
 namespace {
 
-/// Depth at which the ray is nearest to a pixel of the same depth, to half a plane.
+/// Returns the depth (to half a plane) at which the ray is nearest to a pixel with that depth.
 std::optional<double> depthAlong(const Eigen::Vector3d& center_ref, const Eigen::Vector3d& ray_ref,
                                  const WarpTarget& target) {
   // The pixel of a ray is linear in inverse depth.
@@ -97,7 +97,7 @@ std::optional<double> depthAlong(const Eigen::Vector3d& center_ref, const Eigen:
   return found_m;
 }
 
-/// @return std::nullopt if the event has no depth.
+/// Warps an event. @return std::nullopt if no pixel near its ray has a depth.
 std::optional<WarpedEvent> warped(const CameraEvents& camera, const Event& event,
                                   const Rigid3& T_ref_rig, const WarpTarget& target) {
   const double since_s = secondsBetween(target.t_ref_ns, event.t_ns);
@@ -165,10 +165,10 @@ std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t ever
 
 namespace {
 
-/// The sum of the squares of the images' harmonic mean. Replaces each image by the derivative by
-/// its values.
+/// Returns the sum of the squares of the images' harmonic mean. Replaces the values of each image
+/// by the derivatives of this sum by these values.
 double fuse(std::vector<cv::Mat1f>& images) {
-  constexpr float kMinValue = 1e-6F;  // events; the mean is 0 where a camera has fewer
+  constexpr float kMinValue = 1e-6F;  // events; the mean is 0 if a camera has fewer
   const auto cameras = static_cast<float>(images.size());
   double contrast = 0;
   for (int y = 0; y < images.front().rows; ++y) {
@@ -198,8 +198,8 @@ double fuse(std::vector<cv::Mat1f>& images) {
 struct EventContrast::Cell {
   int x = 0;
   int y = 0;
-  float right = 0;  // weight of the right two
-  float below = 0;  // weight of the lower two
+  float right = 0;  // weight of the two right pixels
+  float below = 0;  // weight of the two lower pixels
   bool inside = false;
 };
 
@@ -264,7 +264,7 @@ cv::Mat1f EventContrast::imageOf(std::size_t camera, const Change& change) const
 cv::Mat1f EventContrast::smoothed(const cv::Mat1f& image) const {
   cv::Mat1f result;
   const int side = 2 * static_cast<int>(std::ceil(3 * blur_px_)) + 1;
-  // A border of zeros makes smoothing its own transpose: the gradient needs that.
+  // With a border of zeros, smoothing is its own transpose: the gradient needs this.
   cv::GaussianBlur(image, result, cv::Size(side, side), blur_px_, blur_px_, cv::BORDER_CONSTANT);
   return result;
 }

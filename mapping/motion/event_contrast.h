@@ -21,28 +21,28 @@ struct VelocityCorrection {
   Eigen::Vector3d linear_m_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
 
-  /// T_rig_true at a time after (negative: before) the reference time: the exponential map of
-  /// SE(3), a screw.
+  /// Returns T_rig_true at a time after (negative: before) the reference time: the exponential map
+  /// of SE(3), a screw motion.
   Rigid3 displacement(double since_s) const;
 };
 
-/// The corrected motion during a window. It has a pose at the same times of [t0, t1), and at the
-/// reference time, as `trajectory`.
+/// Returns the corrected motion during a window. In [t0, t1) it has poses at the times of
+/// `trajectory`, and one at the reference time.
 /// @param trajectory has a pose at the reference time.
 Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& window,
                                const VelocityCorrection& correction);
 
-/// A semi-dense depth map spread over the pixels around: the depth of the nearest pixel that has
-/// one, and the distance to that pixel.
+/// A semi-dense depth map that is spread over the pixels around: each pixel has the depth of the
+/// nearest pixel with a depth, and the distance to that pixel.
 class NearestDepths {
  public:
-  /// @param depth 0 where there is none.
-  /// @param radius_px to which distance a depth is spread.
+  /// @param depth metres; 0: no depth.
+  /// @param radius_px the distance to which a depth is spread.
   NearestDepths(const cv::Mat1f& depth, double radius_px);
 
-  /// No pixel has a depth.
+  /// Returns whether no pixel has a depth.
   bool empty() const { return empty_; }
-  /// Inverse depth (1/m) of the nearest pixel with a depth; 0 where none is within the radius.
+  /// Returns the inverse depth (1/m) of the nearest pixel with a depth; 0 beyond the radius.
   float inverseDepth(cv::Point pixel) const { return inverse_(pixel); }
   float distancePx(cv::Point pixel) const { return distance_(pixel); }
 
@@ -53,11 +53,11 @@ class NearestDepths {
 };
 
 /// An event warped to the reference view at its depth, and its derivatives by a correction of the
-/// rig's velocity and of the depth. First order: exact to 0.02 pixels for rotations of half a
-/// degree at a focal length of 300 pixels.
+/// rig's velocity and of the depth. The derivatives are of first order: exact to 0.02 pixels for
+/// rotations of half a degree at a focal length of 300 pixels.
 struct WarpedEvent {
-  Eigen::Vector2f pixel;  ///< In the reference view, without a correction.
-  /// Derivative of the pixel by (linear in m/s, angular in rad/s).
+  Eigen::Vector2f pixel;  ///< Position in the reference view, without a correction.
+  /// Derivative of the pixel by the velocity (linear in m/s, angular in rad/s).
   Eigen::Matrix<float, 2, 6> by_velocity;
   Eigen::Vector2f by_inverse_depth;  ///< Derivative of the pixel by inverse depth in 1/m.
 };
@@ -74,13 +74,13 @@ struct WarpTarget {
   Rigid3 T_ref_world;
   ReferenceView view;
   std::vector<InversePlane> planes;       ///< Candidate depths.
-  const NearestDepths* depths = nullptr;  ///< Of the view; not owned.
+  const NearestDepths* depths = nullptr;  ///< Depths of the view; not owned.
   std::int64_t t_ref_ns = 0;
 };
 
 /// Warps one camera's events along a trajectory. The depth of an event is that of a pixel near its
 /// ray. Events without such a pixel, without a pose or outside the lens are left out.
-/// @param every of each `every` consecutive events, the middle one is warped.
+/// @param every only the middle one of each `every` consecutive events is warped.
 std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t every,
                                     const Trajectory& trajectory, const WarpTarget& target);
 
@@ -90,22 +90,22 @@ std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t ever
 ///
 /// Variables: six for the rig's velocity, linear (m/s) and angular (rad/s), and one for each square
 /// patch of the view, added to its inverse depth (1/m). The patches are needed because depth that
-/// was found along a wrong motion fits that motion: fixed depth would hold the motion too.
+/// was found along a wrong motion fits that motion: fixed depths would keep the wrong motion.
 class EventContrast {
  public:
   /// @param events of each camera; must outlive this object. @param patch_px side of a patch.
   EventContrast(const std::vector<std::vector<WarpedEvent>>& events, cv::Size view, int patch_px);
 
-  /// Standard deviation of the Gaussian that images are smoothed with, in pixels, above 0.
+  /// Sets the standard deviation of the Gaussian that smooths the images, in pixels, above 0.
   void setBlur(double blur_px) { blur_px_ = blur_px; }
 
-  /// 6 plus the number of patches with events.
+  /// Returns 6 plus the number of patches with events.
   Eigen::Index variables() const { return 6 + static_cast<Eigen::Index>(events_in_patch_.size()); }
-  /// For each patch with events.
+  /// The number of events in each patch that has events.
   const std::vector<std::size_t>& eventsInPatch() const { return events_in_patch_; }
 
-  /// The contrast with a change of the variables, and its gradient. 0 where the events of the
-  /// cameras do not meet in any pixel. Cameras run in parallel.
+  /// Returns the contrast after a change of the variables, and sets its gradient. It is 0 if the
+  /// events of the cameras meet in no pixel. Cameras run in parallel.
   double at(const Eigen::VectorXd& change, Eigen::VectorXd& gradient) const;
 
  private:

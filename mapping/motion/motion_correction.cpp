@@ -44,7 +44,7 @@ Eigen::VectorXd minimise(
     value = next;
     gradient = next_gradient;
     const double curvature = step.dot(change);
-    if (curvature <= 0) continue;  // not convex here: the step says nothing of the Hessian
+    if (curvature <= 0) continue;  // not convex here: no update of the Hessian
     const Eigen::VectorXd scaled = inverse_hessian * change;
     inverse_hessian -= (step * scaled.transpose() + scaled * step.transpose()) / curvature;
     inverse_hessian += (1 + change.dot(scaled) / curvature) / curvature * step * step.transpose();
@@ -54,12 +54,12 @@ Eigen::VectorXd minimise(
 
 namespace {
 
-/// The events of each camera where the view has depth, at most `max_events` in all. Cameras without
-/// such an event are left out: the harmonic mean over cameras would be 0 everywhere.
+/// Warps the events of each camera to the depths of the view, at most `max_events` in all. Cameras
+/// without such events are left out: they would make the harmonic mean over cameras 0 everywhere.
 std::vector<std::vector<WarpedEvent>> warpToDepth(const WindowInput& input,
                                                   const Trajectory& motion, const cv::Mat1f& depth,
                                                   int max_events) {
-  constexpr double kRadiusPx = 4;  // a blurred keyframe's depths are off by that much in the image
+  constexpr double kRadiusPx = 4;  // error in the image of a blurred keyframe's depths
   std::vector<std::vector<WarpedEvent>> warped(input.cameras.size());
   const NearestDepths depths(depth, kRadiusPx);
   if (depths.empty()) return warped;
@@ -83,7 +83,7 @@ std::vector<std::vector<WarpedEvent>> warpToDepth(const WindowInput& input,
 VelocityCorrection findCorrection(const WindowInput& input, const Trajectory& motion,
                                   const cv::Mat1f& depth, const VelocityCorrection& current,
                                   const MotionCorrectionOptions& options) {
-  constexpr double kSigmaPlanes = 2;  // of depths found along a wrong motion
+  constexpr double kSigmaPlanes = 2;  // sigma of depths found along a wrong motion
   const ContrastSearch search{depth.size(), kSigmaPlanes * input.planes.inverseDepthStep(),
                               current};
   return maximizeContrast(warpToDepth(input, motion, depth, options.max_events), search, options);
@@ -104,9 +104,9 @@ VelocityCorrection maximizeContrast(const std::vector<std::vector<WarpedEvent>>&
   sigmas << Eigen::Vector3d::Constant(options.motion_sigma_m_s),
       Eigen::Vector3d::Constant(kRadiansPerDegree * options.motion_sigma_deg_s),
       Eigen::VectorXd::Constant(patches, search.sigma_inverse_depth);
-  // One standard deviation of a velocity costs half of this fraction of the contrast; one of a
-  // patch's depth, half of this fraction of the contrast of the patch's own events. Small: the
-  // priors decide only where events do not.
+  // A velocity of one standard deviation costs half of kVelocityPrior times the contrast. A change
+  // of a patch's depth by one standard deviation costs half of kDepthPrior times the contrast of
+  // the patch's own events. Both are small: the priors decide only if the events do not.
   constexpr double kVelocityPrior = 1e-3;
   constexpr double kDepthPrior = 5e-3;
   Eigen::VectorXd prior(count);
@@ -130,7 +130,7 @@ VelocityCorrection maximizeContrast(const std::vector<std::vector<WarpedEvent>>&
   descent.max_evaluations = 25;
   Eigen::VectorXd position = Eigen::VectorXd::Zero(count);
   position.head<6>() = current.head<6>().cwiseQuotient(sigmas.head<6>());
-  // Smooth images have a wide basin of convergence, sharp ones an exact minimum.
+  // Smooth images have a wide basin of convergence; sharp images have an exact minimum.
   for (const double blur_px : {2.0, 1.0}) {
     contrast.setBlur(blur_px);
     position = minimise(cost, position, descent);

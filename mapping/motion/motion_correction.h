@@ -14,44 +14,44 @@
 
 namespace efm {
 
-/// Minimum of a smooth function by the method of Broyden, Fletcher, Goldfarb and Shanno, with a
-/// line search that halves its steps (Nocedal and Wright, Numerical Optimization, 2006, Alg. 6.1).
-/// For few variables of about the same scale.
+/// Options of `minimise`.
 struct QuasiNewtonOptions {
   int max_evaluations = 60;
   double first_step = 0.1;  ///< Length of the first trial step, in the variables' unit.
   double min_step = 1e-4;   ///< A shorter step ends the search.
 };
 
-/// @param function returns its value at a position and sets the gradient; infinite outside its
-/// domain.
+/// Finds the minimum of a smooth function by the method of Broyden, Fletcher, Goldfarb and Shanno,
+/// with a line search that halves its steps (Nocedal and Wright, Numerical Optimization, 2006, Alg.
+/// 6.1). It suits few variables of about the same scale.
+/// @param function returns its value (infinite outside its domain), and sets the gradient.
 /// @return the best position found; never worse than the start.
 Eigen::VectorXd minimise(
     const std::function<double(const Eigen::VectorXd&, Eigen::VectorXd&)>& function,
     const Eigen::VectorXd& start, const QuasiNewtonOptions& options = {});
 
-/// A tracker that jitters gives a window a wrong motion, which blurs the DSI. The velocity error is
-/// taken as constant within the window, and found as the one with the sharpest images of warped
-/// events (contrast maximization: Gallego et al., CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.2,
-/// interpret DSIs as these images).
+/// Correction of the motion within a window. A tracker that jitters gives a window a wrong motion,
+/// which blurs the DSI. The velocity error is taken as constant within the window. The correction
+/// is the one with the sharpest images of warped events (contrast maximization: Gallego et al.,
+/// CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.2, interpret DSIs as these images).
 ///
-/// Needs several cameras: a single camera explains a wrong motion as well by wrong depths. For
-/// trackers with an error within a window; it does not improve exact poses.
+/// It needs several cameras: with a single camera, wrong depths explain a wrong motion as well. It
+/// is for trackers with errors within a window; it does not improve exact poses.
 struct MotionCorrectionOptions {
   bool correct_motion = false;
-  /// Standard deviations of the tracker's velocity error on each axis; they hold the correction
-  /// near 0 where the events do not determine it. Above 0, at most 10 m/s and 1000 degrees per
-  /// second.
+  /// Standard deviations of the tracker's velocity error on each axis; they keep the correction
+  /// near 0 if the events do not determine it. Above 0, at most 10 m/s and 1000 degrees per second.
   double motion_sigma_m_s = 0.05;
   double motion_sigma_deg_s = 5;
-  /// Rounds of estimating depth and velocity, each from the other; a round takes two to three times
-  /// as long as a keyframe without correction. 1 to 10. The second round finds most of the
-  /// remaining error.
+  /// Number of rounds: each estimates the velocity from the depth, then the depth from the
+  /// velocity. A round takes two to three times as long as a keyframe without correction. 1 to 10.
+  /// The second round finds most of the remaining error.
   int motion_rounds = 2;
-  /// Events that are warped, of all cameras together: more take longer. 100 to 10,000,000.
+  /// Maximum number of warped events, of all cameras together; more events take longer. 100 to
+  /// 10,000,000.
   int max_events = 20000;
-  /// Fraction by which the sharpness of the fused DSI must grow before a correction is accepted:
-  /// less may be chance. 0 to 1.
+  /// Fraction by which the sharpness of the fused DSI must grow before a correction is accepted: a
+  /// smaller gain may be chance. 0 to 1.
   double min_gain = 0.01;
 
   template <typename Self, typename Visit>
@@ -68,11 +68,11 @@ struct MotionCorrectionOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// The correction that makes the events of all cameras sharpest, given the depth found along a
-/// motion. Runs on the threads of the task arena that it is called in.
-/// @param motion the tracker's, corrected by `current`.
-/// @param depth of the view, found along `motion`; 0: none.
-/// @return `current` where the events do not determine a correction.
+/// Finds the correction that makes the events of all cameras sharpest, given the depth that was
+/// found along a motion. Runs on the threads of the caller's task arena.
+/// @param motion the tracker's motion, corrected by `current`.
+/// @param depth of the view, found along `motion`, metres; 0: no depth.
+/// @return `current` if the events do not determine a correction.
 VelocityCorrection findCorrection(const WindowInput& input, const Trajectory& motion,
                                   const cv::Mat1f& depth, const VelocityCorrection& current,
                                   const MotionCorrectionOptions& options);
@@ -85,8 +85,8 @@ struct ContrastSearch {
   VelocityCorrection current;
 };
 
-/// The correction that maximizes the contrast of the warped events of all cameras.
-/// @return `search.current` where there are no events.
+/// Finds the correction that maximizes the contrast of the warped events of all cameras.
+/// @return `search.current` if there are no events.
 VelocityCorrection maximizeContrast(const std::vector<std::vector<WarpedEvent>>& events,
                                     const ContrastSearch& search,
                                     const MotionCorrectionOptions& options);
