@@ -22,7 +22,7 @@ class SparseMask {
 
   std::size_t size() const { return columns_.size(); }
   int rows() const { return static_cast<int>(row_begin_.size()) - 1; }
-  /// The pixels of row `y` have indices [rowBegin(y), rowBegin(y + 1)).
+  /// The pixels of row `y` have the indices [rowBegin(y), rowBegin(y + 1)).
   std::size_t rowBegin(int y) const { return row_begin_[static_cast<std::size_t>(y)]; }
   int column(std::size_t pixel) const { return columns_[pixel]; }
 

@@ -9,7 +9,7 @@
 namespace efm {
 namespace {
 
-/// An event before this time comes too late after one at `t_ns`. The time may not be checked yet.
+/// Returns the time before which events are too late after an event at `t_ns` (any number).
 std::int64_t lateAfter(std::int64_t t_ns) {
   return std::max(t_ns, kMinTimeNs + kMaxEventDelayNs) - kMaxEventDelayNs;
 }
@@ -19,7 +19,7 @@ bool isInOneOf(const std::vector<Window>& windows, std::int64_t t_ns) {
                      [&](const Window& window) { return window.contains(t_ns); });
 }
 
-/// Tells of times in order whether a trajectory has a pose there. Asks it once per segment.
+/// Finds out for increasing times whether a trajectory has a pose. Searches it once per segment.
 class PosedTimes {
  public:
   PosedTimes(const Trajectory& trajectory, std::size_t& cursor)
@@ -74,7 +74,7 @@ void CameraStream::requireValid(EventSpan events) const {
   }
 }
 
-/// An event before this time, on the camera's clock, comes too late after the newest one.
+/// Returns the time, on the camera's clock, before which events are too late.
 std::int64_t CameraStream::lateBefore() const {
   return newest_ns_ ? lateAfter(*newest_ns_ - time_offset_ns_) : kMinTimeNs;
 }

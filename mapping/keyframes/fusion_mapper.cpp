@@ -15,13 +15,13 @@
 namespace efm {
 namespace {
 
-/// A camera whose newest event is older than the others' by this much is taken to be silent.
+/// A camera is silent if its newest event is this much older than the newest packet.
 constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
-/// A pose may be older than the newest one by this much.
+/// A pose may be older than the newest pose by this duration.
 constexpr std::int64_t kMaxPoseDelayNs = kNanosecondsPerSecond;
 
-/// Mean depth of the scene before the first keyframe: the middle plane of inverse spacing, which is
-/// the harmonic mean of the limits.
+/// Returns the assumed mean depth of the scene before the first keyframe: the middle plane of
+/// inverse spacing, which is the harmonic mean of the limits.
 double depthGuess(const DepthPlanesOptions& planes) {
   return 2.0 / (1.0 / planes.min_depth_m + 1.0 / planes.max_depth_m);
 }
@@ -107,7 +107,7 @@ void FusionMapper::addPose(const StampedPose& pose) {
 void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked) {
   CameraStream& stream = cameras_.at(static_cast<std::size_t>(camera));
   if (events.empty()) return;
-  const Event ends[] = {events.front(), events.back()};  // of all times
+  const Event ends[] = {events.front(), events.back()};  // the earliest and the latest time
   stream.requireValid(checked ? EventSpan(ends, ends + 2) : EventSpan(events));
   const std::int64_t begin_ns = stream.onTrajectoryClock(events.front().t_ns);
   packet_ns_ = std::max(packet_ns_.value_or(begin_ns), begin_ns);
@@ -194,9 +194,9 @@ void FusionMapper::dropWindowsBefore(std::int64_t t_ns, DropReason reason) {
   releaseBefore(t_ns);
 }
 
-/// The windows of [t0, t1) are given up.
+/// Drops the windows in [t0, t1).
 void FusionMapper::loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason) {
-  if (reason == DropReason::kPaused) return;  // the host does not want them
+  if (reason == DropReason::kPaused) return;  // the host does not want these windows
   for (CameraStream& camera : cameras_) camera.dropWindows(t0_ns, t1_ns);
 }
 
@@ -246,7 +246,7 @@ void FusionMapper::setPlanes(const DepthPlanesOptions& planes) {
   if (mapper_) mapper_->setPlanes(planes);
 }
 
-/// The current window, if all of its events and poses are here.
+/// Returns the current window if it is complete: all of its events and poses are here.
 std::optional<Window> FusionMapper::coveredWindow() {
   findStart();
   if (!start_ns_) return std::nullopt;
@@ -255,8 +255,8 @@ std::optional<Window> FusionMapper::coveredWindow() {
   return window && isCovered(*window) ? window : lastWindow();
 }
 
-/// The window that ends with the recording, once all others are mapped. It needs events that may
-/// have been released where windows were given up.
+/// Returns the window that ends with the recording, once all other windows are mapped. The events
+/// that it needs may have been released when windows were dropped.
 std::optional<Window> FusionMapper::lastWindow() {
   if (!finished_ || !options_.fill_last_window) return std::nullopt;
   std::optional<std::int64_t> last_ns;
@@ -276,12 +276,12 @@ std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
   return events;
 }
 
-/// The filters see an event once no earlier one of its camera can come.
+/// Filters an event once no earlier event of its camera can come.
 void FusionMapper::filterEvents() {
   for (CameraStream& camera : cameras_) camera.filterUntil(completeUntil(camera));
 }
 
-/// The recording starts at the first event with a pose. Earlier events are released.
+/// Finds the start of the recording: the first event with a pose. Releases earlier events.
 void FusionMapper::findStart() {
   if (options_.only_window) start_ns_ = options_.only_window->t0_ns;
   if (start_ns_ || trajectory_.empty()) return;
@@ -309,8 +309,8 @@ void FusionMapper::skipEmptyWindows() {
   counts_.windows_without_events += policy_->advancePast(*this, empty_until_ns);
 }
 
-/// Whether all events and poses of a window are here. `only_window` is mapped at the end in any
-/// case.
+/// Returns whether a window is complete: all of its events and poses are here. `only_window` is
+/// complete after `finish` in any case.
 bool FusionMapper::isCovered(const Window& window) const {
   if (options_.only_window) {
     if (finished_) return true;
@@ -355,7 +355,7 @@ KeyframeMapper& FusionMapper::keyframeMapper() const {
   return *mapper_;
 }
 
-/// Events before this time are complete, with their poses, and no later window needs them.
+/// Returns the time before which events and poses are complete and no later window needs them.
 std::int64_t FusionMapper::releasableUntil() const {
   std::int64_t start_ns = policy_->earliestStart(*this);
   if (options_.fill_last_window) start_ns = std::min(start_ns, policy_->earliestLast(*this));
@@ -377,10 +377,10 @@ MapperCounts FusionMapper::counts() const {
   return counts;
 }
 
-/// No event of a camera before this time is still to come.
+/// Returns the time until which a camera's events are complete.
 std::int64_t FusionMapper::completeUntil(const CameraStream& camera) const {
   if (finished_) return kMaxTimeNs;
-  // Compared with the beginning of packets: within a long packet of another camera, this one need
+  // The beginning of packets is compared: during a long packet of another camera, this camera need
   // not have delivered yet.
   const std::int64_t silent_ns = packet_ns_ ? *packet_ns_ - kMaxCameraLagNs : kMinTimeNs;
   return std::max(camera.coveredNs(), silent_ns);
@@ -410,7 +410,7 @@ std::optional<std::int64_t> FusionMapper::timeOfEvent(std::int64_t from_ns,
   const std::size_t wanted = countBefore(from_ns) + static_cast<std::size_t>(count);
   std::int64_t last_ns = completeNs();
   if (countBefore(last_ns) < wanted) return std::nullopt;
-  // The earliest time with `wanted` events at it or before.
+  // Finds the earliest time with `wanted` events at or before it.
   std::int64_t t_ns = from_ns;
   for (--last_ns; t_ns < last_ns;) {
     const std::int64_t middle_ns = t_ns + (last_ns - t_ns) / 2;

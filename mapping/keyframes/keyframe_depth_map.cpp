@@ -34,7 +34,7 @@ cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView
     const Eigen::Vector2d pixel = view.project(ray.homogeneous());
     if (!((pixel.array() > -0.5).all() && pixel.x() < view.width - 0.5 &&
           pixel.y() < view.height - 0.5)) {
-      continue;  // also not a number: no ray
+      continue;  // also if the pixel is not a number: no ray
     }
     const auto x = static_cast<int>(std::lround(pixel.x()));
     const auto y = static_cast<int>(std::lround(pixel.y()));

@@ -23,7 +23,7 @@ enum class Stage {
   kDepth,   ///< Extraction of the depth map.
 };
 
-/// Called when a stage begins and ends, from the thread that runs the mapper.
+/// Callbacks at the beginning and the end of a stage, in the thread that runs the mapper.
 class StageHook {
  public:
   virtual ~StageHook() = default;
@@ -61,14 +61,15 @@ struct EventImage {
   cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: negative, positive events.
 };
 
-/// @param camera with events inside the sensor alone: `KeyframeMapper` refuses others.
+/// Counts a camera's events per pixel.
+/// @param camera has events inside the sensor only: `KeyframeMapper` rejects other events.
 EventImage eventImageOf(const CameraEvents& camera);
 
-/// The reference camera's events as an image that fits on the depth map: undistorted, those nearest
-/// to the reference time. One event per 8 pixels of the sensor draws sharp edges; all events of a
-/// window would blur them by the window's motion. Events outside the view are left out.
+/// Returns the reference camera's events as an image that fits on the depth map: undistorted, and
+/// only the events nearest to the reference time. One event per 8 pixels draws sharp edges; all
+/// events of a window would blur the edges by its motion. Events outside the view are left out.
 /// @param camera the reference camera of `view`.
-/// @return per pixel of the view: negative, positive events.
+/// @return per pixel of the view, the numbers of negative and positive events.
 cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView& view,
                                  std::int64_t t_ref_ns);
 
@@ -80,8 +81,8 @@ struct KeyframeDepthMap {
   DepthMap map;
   /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
   double parallax_px_m = 0;
-  double max_confidence = 0;  ///< Over all pixels, with depth or without.
-  /// Of the tracker's motion in the window, if there was one.
+  double max_confidence = 0;  ///< Maximum over all pixels, with depth or without.
+  /// Correction of the tracker's motion in the window, if one was found.
   std::optional<VelocityCorrection> motion_correction;
 
   /// Events that voted, per camera of the rig (0: not selected).
@@ -91,12 +92,12 @@ struct KeyframeDepthMap {
   std::uint64_t over_budget = 0;    ///< Events of the window that were not chosen.
   VoteCounts votes;                 ///< Summed over cameras.
   std::vector<int> silent_cameras;  ///< Selected cameras without an event that voted.
-  /// Sub-intervals (of all time slices) without an event that voted, summed over the other cameras.
+  /// Sub-intervals (of all time slices) without a voting event, summed over cameras with votes.
   std::uint64_t silent_subintervals = 0;
 
-  std::vector<CameraDepthMap> camera_maps;  ///< Of the fused cameras, if the options ask for them.
-  std::vector<EventImage> event_images;     ///< Of the selected cameras, if asked for.
-  /// `viewEventsOf` the reference camera. Empty unless asked for, and where it is not selected.
+  std::vector<CameraDepthMap> camera_maps;  ///< One per fused camera, if the options ask for them.
+  std::vector<EventImage> event_images;     ///< One per selected camera, if asked for.
+  /// `viewEventsOf` the reference camera. Empty if not asked for, or if the camera is not selected.
   cv::Mat_<cv::Vec2i> view_events;
 };
 

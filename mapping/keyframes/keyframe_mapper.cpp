@@ -65,7 +65,7 @@ void removeSilent(std::vector<WindowRays>& cameras) {
   cameras.erase(std::remove_if(cameras.begin(), cameras.end(), silent), cameras.end());
 }
 
-/// The contrast of the fused DSI along its peaks: large where the events of all cameras meet.
+/// Returns the contrast of the fused DSI along its peaks: large if all cameras' events meet.
 double sharpnessOf(const KeyframeDepthMap& keyframe) {
   return keyframe.map.confidence.dot(keyframe.map.confidence);
 }
@@ -133,7 +133,7 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
   if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
   const RigCamera& reference = cameraOf(options_.reference_camera);
-  reference.validate();  // it may be none of the selected ones
+  reference.validate();  // it may not be a selected camera
   view_ = makeReferenceView(reference.model, options_.view);
   for (const int camera : selected_) {
     requireCamera(rig_, camera, "cameras");
@@ -207,7 +207,7 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
   for (std::size_t i = 0; i < selected_.size(); ++i) {
     const EventSpan& of_camera = events.at(static_cast<std::size_t>(selected_[i]));
     const RigCamera& calibration = cameraOf(selected_[i]);
-    // What follows looks up and counts by pixel.
+    // Later steps look up and count by pixel.
     requireInsideSensor(of_camera, selected_[i], calibration.model);
     cameras.push_back({selected_[i], &calibration, &undistortion_[i], of_camera});
   }
@@ -279,7 +279,7 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
     keyframe.camera_maps.push_back({cameras.front().camera, keyframe.map});
   }
   for (std::size_t c = 0; c < swept.cameras.size(); ++c) {
-    // Without the sequence maximum: the ray densities of one camera differ from fused ones.
+    // Without the sequence maximum: the ray densities of one camera differ from fused densities.
     facts.sequence_maximum.reset();
     keyframe.camera_maps.push_back(
         {cameras[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction, facts)});
@@ -288,8 +288,8 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
 
 namespace {
 
-/// How far a unit of inverse depth (1/m) moves the view of a camera at `p_view` (metres), in
-/// pixels, on average over the view.
+/// Returns the distance by which a unit of inverse depth (1/m) moves the view of a camera at
+/// `p_view` (metres), in pixels, on average over the view.
 double meanParallax(const ReferenceView& view, const Eigen::Vector3d& p_view) {
   constexpr int kGrid = 5;
   double sum = 0;

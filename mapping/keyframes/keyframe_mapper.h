@@ -22,9 +22,9 @@ namespace efm {
 struct WindowRays {
   int camera = 0;                         ///< Index in the rig.
   CameraRays rays;                        ///< One bundle per part of `EventGroups`.
-  std::uint64_t events = 0;               ///< With a ray.
-  std::uint64_t without_pose = 0;         ///< Without a ray.
-  std::uint64_t outside_lens = 0;         ///< Without a ray, with a pose.
+  std::uint64_t events = 0;               ///< Events with a ray.
+  std::uint64_t without_pose = 0;         ///< Events without a pose.
+  std::uint64_t outside_lens = 0;         ///< Events with a pose, without a ray.
   std::uint64_t silent_subintervals = 0;  ///< Sub-intervals (of all slices) without a ray.
 };
 
@@ -40,7 +40,7 @@ struct CorrectedWindow {
   const WindowInput& input;
   const Trajectory& tracked;
   const MotionCorrectionOptions& options;
-  DsiSink* sink = nullptr;      ///< May be null; receives the DSI of the result alone.
+  DsiSink* sink = nullptr;      ///< May be null; receives only the DSI of the result.
   StageHook* stages = nullptr;  ///< May be null.
 };
 
@@ -48,58 +48,58 @@ struct CorrectedWindow {
 using MapAlong = std::function<KeyframeDepthMap(const Trajectory& motion, DsiSink* sink)>;
 
 /// Maps the window along the tracker's motion, then finds the correction of the motion from the
-/// depth and maps again along the corrected motion, as long as the fused DSI becomes sharper.
+/// depth and maps again along the corrected motion, while the fused DSI becomes sharper.
 /// @return the sharpest keyframe, with its correction if there is one.
 KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along);
 
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;
-  /// The camera of the reference view; it need not be among the selected ones.
+  /// The camera of the reference view; it need not be a selected camera.
   int reference_camera = 0;
   ReferenceViewOptions view;
   SubintervalOptions subintervals;
   /// Maximum number of a camera's events that take part, evenly chosen (`EvenChoice`); 0: no limit.
   std::uint32_t max_events_per_camera = 0;
-  SplitFusionOptions split;  ///< Groups of events; each is divided into the sub-intervals.
-  /// Exclude a silent camera (none of its events votes) from the fusion. Otherwise it makes
-  /// AND-like rules zero everywhere.
+  SplitFusionOptions split;  ///< Groups of events; each group is divided into the sub-intervals.
+  /// True: a silent camera (none of its events votes) is excluded from the fusion. Otherwise the
+  /// camera makes AND-like rules zero everywhere.
   bool exclude_silent = false;
   PosePacketsOptions packets;
   SpaceSweepOptions sweep;
   DepthExtractionOptions extraction;
   MotionCorrectionOptions motion;  ///< Correction of the motion within a window.
-  /// The value of `WhiteLevel::kSequence`, if an earlier pass over the recording found it. Not
-  /// given: the robust maximum of the keyframes so far.
+  /// The value of `WhiteLevel::kSequence`, if an earlier pass over the recording found it. If it is
+  /// not given, the robust maximum of the keyframes so far is used.
   std::optional<double> sequence_maximum;
-  bool camera_maps = false;   ///< Also a depth map of each camera alone, in the same view.
-  bool event_images = false;  ///< Also each camera's events as an image.
-  bool view_events = false;   ///< Also the reference camera's events in the view.
+  bool camera_maps = false;   ///< True: also a depth map of each camera alone, in the same view.
+  bool event_images = false;  ///< True: also each camera's events as an image.
+  bool view_events = false;   ///< True: also the reference camera's events in the view.
 
   void validate() const;
 };
 
-/// The method: the events and poses of one window in, one semi-dense depth map out (Ghosh and
-/// Gallego 2022, Algorithm 2 for any number of cameras; with one sub-interval Algorithm 1).
-/// From one window to the next it keeps only the running maximum of confidences.
+/// The method: it maps the events and poses of one window to one semi-dense depth map (Ghosh and
+/// Gallego 2022, Algorithm 2 for any number of cameras; with one sub-interval Algorithm 1). From
+/// one window to the next it keeps only the running maximum of confidences.
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
-  /// @param undistortion of the selected cameras, in their order, where they are known already.
+  /// @param undistortion of the selected cameras, in their order, if they are known already.
   KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options,
                  std::vector<UndistortionTable> undistortion = {});
 
   /// @param events of the window, per camera of the rig, in time order, on the trajectory's clock.
-  /// @return nothing where the reference time has no pose.
+  /// @return std::nullopt if the reference time has no pose.
   /// @throws std::invalid_argument naming an event of a selected camera that lies outside its
-  /// sensor. The check takes 0.6 ns an event, where 100 planes take 100 ns or more.
+  /// sensor. The check takes 0.6 ns per event; the votes on 100 planes take 100 ns or more.
   std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageHook* stages = nullptr);
 
-  /// The depth planes from now on.
+  /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);
 
-  /// T_world_ref of the reference view for a pose of the rig.
+  /// Returns T_world_ref of the reference view for a pose of the rig.
   Rigid3 referencePose(const Rigid3& T_world_rig) const;
   const Rig& rig() const { return rig_; }
   const DepthPlanes& planes() const { return planes_; }
@@ -126,18 +126,18 @@ class KeyframeMapper {
   RobustMaximum sequence_maximum_;
 };
 
-/// How far the selected cameras are from the reference view within a window: maxima.
+/// The motion of the selected cameras relative to the reference view within a window: maxima.
 struct ViewMotion {
-  double rig_baseline_m = 0;  ///< Of any camera at the reference time.
-  double shift_m = 0;         ///< Of the reference camera, at any time.
-  double rotation_rad = 0;    ///< Of the reference camera.
+  double rig_baseline_m = 0;  ///< Distance of any camera at the reference time.
+  double shift_m = 0;         ///< Distance of the reference camera, at any time.
+  double rotation_rad = 0;    ///< Rotation of the reference camera, at any time.
   /// The parallax of inverse depth, for any camera at any time, averaged over the view: pixels per
   /// 1/m.
   double parallax_px_m = 0;
 };
 
-/// @param cameras the selected ones, as indices of the rig.
-/// @return nothing where the window's reference time has no pose.
+/// Measures the motion within a window. @param cameras indices of the selected cameras.
+/// @return std::nullopt if the window's reference time has no pose.
 std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
                                    const std::vector<int>& cameras,
                                    const KeyframeMapperOptions& options);

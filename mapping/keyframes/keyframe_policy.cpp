@@ -40,7 +40,7 @@ class PeriodPolicy : public KeyframePolicy {
                              std::int64_t end_ns) const override {
     const std::int64_t next_ns = earliestStart(recording);
     const std::int64_t t0_ns = end_ns - window_ns_;
-    const std::int64_t new_ns = t0_ns - (next_ns - stride_ns_);  // no other window has them
+    const std::int64_t new_ns = t0_ns - (next_ns - stride_ns_);  // in no other window
     const bool adds_little = index_ > 0 && new_ns < std::min(stride_ns_, window_ns_) * kLeastAdded;
     if (end_ns <= next_ns || adds_little || t0_ns < recording.startNs()) return std::nullopt;
     return windowOf(t0_ns, end_ns, reference_);
@@ -123,13 +123,13 @@ class EventsPolicy : public KeyframePolicy {
   ReferenceTime reference_;
   std::optional<std::int64_t> before_ns_;  // start of the window before
   std::optional<std::int64_t> next_ns_;
-  /// The events that the last window given up still lacks: their loss is counted with it.
+  /// Number of events that the last dropped window still lacks: their loss counts with that window.
   std::int64_t counted_events_ = 0;
 };
 
 constexpr int kGridSide = 10;
 
-/// A grid of points over the image of a view, all at one depth.
+/// Returns a grid of points over the image of a view, all at one depth.
 std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid3& T_world_ref,
                                           double depth_m) {
   std::vector<Eigen::Vector3d> points;
@@ -165,8 +165,8 @@ double visibleFraction(const std::vector<Eigen::Vector3d>& points_world, const R
 ///   mean depth replaces them.
 /// So a keyframe has enough parallax at any speed (Rebecq et al., IJCV 2018, Sec. 7).
 ///
-/// If the longest window is not enough, its start moves on by a stride: the events of a camera at
-/// rest are in no window.
+/// If the longest window meets neither condition, its start moves on by a stride: the events of a
+/// camera at rest are in no window.
 class BaselinePolicy : public KeyframePolicy {
  public:
   BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m)
@@ -192,12 +192,12 @@ class BaselinePolicy : public KeyframePolicy {
       startAt(*t0_ns + stride_ns_);
     }
   }
-  /// Grows from the end back, stride by stride.
+  /// The window grows from the end back, stride by stride.
   std::optional<Window> last(const RecordingProgress& recording,
                              std::int64_t end_ns) const override {
     const auto first_ns = recording.timeOfEvent(earliestStart(recording), 1);
     if (!first_ns || *first_ns >= end_ns) return std::nullopt;
-    const auto T_world_ref1 = recording.viewPoseAt(end_ns - 1);  // of the last event
+    const auto T_world_ref1 = recording.viewPoseAt(end_ns - 1);  // the pose of the last event
     std::int64_t t0_ns = std::min(*first_ns, end_ns - stride_ns_);
     for (; t0_ns >= recording.startNs() && end_ns - t0_ns <= window_ns_; t0_ns -= stride_ns_) {
       const auto T_world_ref0 = recording.viewPoseAt(t0_ns);
@@ -216,12 +216,12 @@ class BaselinePolicy : public KeyframePolicy {
     return next_ns_.value_or(recording.startNs());
   }
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override {
-    constexpr std::size_t kMaxSeenPoints = 500;  // or so, spread over the image
+    constexpr std::size_t kMaxSeenPoints = 500;  // about; spread over the image
     startAt(window.t1_ns);
     counted_until_ns_ = kMinTimeNs;
     if (keyframe == nullptr) return;
-    // Also if the keyframe has no points: points of an older one, out of view by now, would end
-    // every window after one stride, too early for new points.
+    // Cleared even if the keyframe has no points: points of an older keyframe, out of view by now,
+    // would end every window after one stride, too early for new points.
     seen_world_.clear();
     std::vector<cv::Point> pixels;
     cv::findNonZero(keyframe->map.depth > 0, pixels);
@@ -242,7 +242,7 @@ class BaselinePolicy : public KeyframePolicy {
     startAt(t_ns);
     const std::int64_t uncounted_ns = std::max(from_ns, counted_until_ns_);
     if (t_ns <= uncounted_ns || recording.eventsIn(from_ns, t_ns) == 0) return 0;
-    // Nobody knows the windows that would have come: the longest ones are assumed.
+    // The windows that would have come are unknown: the longest windows are assumed.
     const std::int64_t windows = (t_ns - uncounted_ns - 1) / window_ns_ + 1;
     counted_until_ns_ = uncounted_ns + windows * window_ns_;
     return static_cast<std::uint64_t>(windows);
@@ -271,7 +271,7 @@ class BaselinePolicy : public KeyframePolicy {
   std::vector<Eigen::Vector3d> seen_world_;     // points of the last keyframe
   std::optional<std::int64_t> next_ns_;         // earliest start of the next window
   std::int64_t duration_ns_;                    // the next candidate
-  std::int64_t counted_until_ns_ = kMinTimeNs;  // by the windows that were given up
+  std::int64_t counted_until_ns_ = kMinTimeNs;  // by the dropped windows
 };
 
 class SingleWindowPolicy : public KeyframePolicy {

@@ -32,19 +32,19 @@ ReferenceTime referenceTimeFromName(std::string_view name);
 
 struct KeyframePolicyOptions {
   KeyframePolicyKind policy = KeyframePolicyKind::kPeriod;
-  /// Duration of a window, at least 1e-6; with `kBaseline` the maximum.
+  /// Duration of a window in seconds, at least 1e-6; with `kBaseline` the maximum.
   double window_s = 0.2;
-  /// At least 1e-6. `kPeriod`: from the start of one window to the start of the next; windows
-  /// overlap if it is shorter than `window_s`. `kBaseline`: the step by which a window grows, at
-  /// most `window_s`.
+  /// Seconds, at least 1e-6. `kPeriod`: from the start of one window to the start of the next;
+  /// windows overlap if it is shorter than `window_s`. `kBaseline`: the step by which a window
+  /// grows, at most `window_s`.
   double stride_s = 0.2;
   /// `kEvents`: events in a window, of all selected cameras together, at least 1.
   std::int64_t window_events = 400'000;
   /// `kBaseline`: a window ends once the reference camera has moved this fraction of the scene's
   /// mean depth. Above 0, at most 10. EMVS (Rebecq et al., IJCV 2018, Sec. 7) uses 0.15 to 0.4.
   double min_baseline_ratio = 0.1;
-  /// `kBaseline`: a window ends also once a smaller fraction of the last keyframe's points is in
-  /// view. 0 to 1.
+  /// `kBaseline`: a window also ends once less than this fraction of the last keyframe's points is
+  /// in view. 0 to 1.
   double min_visible_fraction = 0.7;
   ReferenceTime reference = ReferenceTime::kMiddle;
 
@@ -62,7 +62,7 @@ struct KeyframePolicyOptions {
   void validate() const;
 };
 
-/// The window [t0, t1) and its reference time.
+/// Returns the window [t0, t1) with its reference time.
 Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference);
 
 /// The part of a recording that has arrived, for a policy. Queries about events and poses consider
@@ -70,45 +70,47 @@ Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference)
 class RecordingProgress {
  public:
   virtual ~RecordingProgress() = default;
-  /// The first event with a pose.
+  /// Returns the time of the first event with a pose.
   virtual std::int64_t startNs() const = 0;
-  /// The newest event of any camera: the recording lasts at least until then.
+  /// Returns the time of the newest event of any camera: the recording lasts at least until then.
   virtual std::int64_t reachedNs() const = 0;
-  /// All events of the selected cameras before this time are here, and poses reach it.
+  /// Returns the time until which the events of the selected cameras and the poses are complete.
   virtual std::int64_t completeNs() const = 0;
-  /// Time of the `count`-th event (from 1) at or after `from_ns`, of the selected cameras together;
-  /// nothing while fewer events are complete.
+  /// Returns the time of the `count`-th event (from 1) at or after `from_ns`, of the selected
+  /// cameras together; std::nullopt while fewer events are complete.
   virtual std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns,
                                                   std::int64_t count) const = 0;
-  /// The number of events of the selected cameras in [t0, t1) that are here, complete or not.
+  /// Returns the number of events of the selected cameras in [t0, t1) that are here, complete or
+  /// not.
   virtual std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const = 0;
-  /// T_world_ref of a reference view at a time; nothing where there is no pose.
+  /// Returns T_world_ref of a reference view at a time; std::nullopt if there is no pose.
   virtual std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const = 0;
   virtual const ReferenceView& view() const = 0;
 };
 
-/// Decides which windows of a recording become keyframes, in order of t0.
+/// The choice of the windows of a recording that become keyframes, in order of t0.
 class KeyframePolicy {
  public:
-  /// A last window that adds less than this fraction of what other windows add would be the window
-  /// before once more, and each would seem to support the other's depths.
+  /// A last window must add at least this fraction of what other windows add. Otherwise it would
+  /// nearly repeat the window before it, and both would seem to support each other's depths.
   static constexpr double kLeastAdded = 0.1;
 
   virtual ~KeyframePolicy() = default;
-  /// The current window, as soon as the recording certainly fills it.
-  /// @return nothing before that, and after the last window.
+  /// Returns the current window, as soon as the recording certainly fills it.
+  /// @return std::nullopt before that time, and after the last window.
   virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
-  /// Of a recording that has ended: a full window that ends with it, if it adds enough that is in
-  /// no other one (`kLeastAdded`).
+  /// Returns a full window that ends with a recording that has ended, if enough of it is in no
+  /// other window (`kLeastAdded`).
   /// @param end_ns right after the last event with a pose.
-  /// @return nothing where that window would begin before the recording does.
+  /// @return std::nullopt also if that window would begin before the recording.
   virtual std::optional<Window> last(const RecordingProgress& recording,
                                      std::int64_t end_ns) const = 0;
-  /// `last` needs no events before this time.
+  /// Returns the time before which `last` needs no events.
   virtual std::int64_t earliestLast(const RecordingProgress& recording) const {
     return earliestStart(recording);
   }
-  /// No later window needs events before this time, or poses before `earliestReference`.
+  /// Returns the time before which no later window needs events. Poses are needed from
+  /// `earliestReference` on.
   virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
   virtual std::int64_t earliestReference(const RecordingProgress& recording) const {
     return earliestStart(recording);
@@ -116,21 +118,21 @@ class KeyframePolicy {
   /// Moves on to the next window.
   /// @param keyframe of the current window; null if there is none.
   virtual void advance(const Window& window, const KeyframeDepthMap* keyframe) = 0;
-  /// Skips the windows that end by `t_ns`: they have no events. Cost does not depend on their
-  /// number. None is skipped where every window has events.
+  /// Skips the windows that end by `t_ns`: they have no events. The cost does not depend on their
+  /// number. None is skipped if every window has events.
   /// @return the number of skipped windows.
   virtual std::uint64_t advancePast(const RecordingProgress&, std::int64_t) { return 0; }
-  /// Gives up the windows that begin before `t_ns`. @return their number. Where the ends of windows
-  /// depend on data, which may be missing, it is the number that the events before `t_ns` would
-  /// have filled. A window that is given up piece by piece counts once.
+  /// Drops the windows that begin before `t_ns`. @return the number of these windows. If the ends
+  /// of windows depend on data, which may be missing, it is the number that the events before
+  /// `t_ns` would have filled. A window that is dropped piece by piece counts once.
   virtual std::uint64_t dropWindowsBefore(const RecordingProgress& recording,
                                           std::int64_t t_ns) = 0;
 };
 
-/// @param depth_guess_m mean depth of the scene before the first keyframe.
+/// @param depth_guess_m assumed mean depth of the scene before the first keyframe.
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,
                                                    double depth_guess_m);
-/// This window alone, whether the recording fills it or not.
+/// Makes a policy of this window alone, whether the recording fills it or not.
 std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window);
 
 }  // namespace efm

@@ -101,7 +101,7 @@ class EventContrast {
 
   /// Returns 6 plus the number of patches with events.
   Eigen::Index variables() const { return 6 + static_cast<Eigen::Index>(events_in_patch_.size()); }
-  /// The number of events in each patch that has events.
+  /// Returns the number of events in each patch that has events.
   const std::vector<std::size_t>& eventsInPatch() const { return events_in_patch_; }
 
   /// Returns the contrast after a change of the variables, and sets its gradient. It is 0 if the

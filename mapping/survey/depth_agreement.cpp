@@ -11,12 +11,12 @@
 namespace efm {
 namespace {
 
-constexpr double kRigS = 0.05;    // the rig hardly moves
-constexpr double kMotionS = 0.5;  // the camera sees parallax
+constexpr double kRigS = 0.05;    // seconds in which the rig hardly moves
+constexpr double kMotionS = 0.5;  // seconds in which the camera sees parallax
 constexpr std::size_t kMinPixels = 200;
 constexpr double kWithin = 1.15;
 
-/// Appends the ratios of the pixels that both maps have.
+/// Appends the ratios of the two depths at the pixels where both maps have a depth.
 void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
                   std::vector<double>& ratios) {
   for (int y = 0; y < by_rig_m.rows; ++y) {
@@ -28,10 +28,10 @@ void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
   }
 }
 
-// Of the sensitivity.
+// Constants of the sensitivity.
 constexpr std::size_t kMaxWindows = 3;
 constexpr std::size_t kMinDepths = 50;
-constexpr std::int64_t kClockNs = 5'000'000;  // to either side: 10 ms between them
+constexpr std::int64_t kClockNs = 5'000'000;  // shift to either side: 10 ms between the two
 constexpr double kTravel = 0.05;
 constexpr Coarseness kSmallSweep{160, 20'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
 
@@ -50,7 +50,7 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
     const auto by_rig = rig_sweep.map(middleOf(sample, kRigS));
     if (!by_rig) continue;
     const auto by_motion = motion_sweep.map(middleOf(sample, kMotionS));
-    // Most peaks at the farthest plane: the camera sees too little parallax.
+    // Most peaks lie on the farthest plane: the camera sees too little parallax.
     if (!by_motion || 2 * by_motion->map.pixels.at_farthest > by_motion->map.pixels.candidates) {
       continue;
     }
@@ -113,11 +113,11 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
 
 namespace {
 
-// Wider views, more events and finer planes tell hardly more. The paper's extraction is cheaper,
-// and depths are of no use here.
+// Wider views, more events and finer planes change the result little. The paper's extraction is
+// cheaper, and depths are not needed here.
 constexpr Coarseness kCoarseness{128, kMaxPieceEvents, 2, kNearestSceneM, ExtractionMethod::kPaper};
 
-/// The cameras of the map, in a small view.
+/// Returns default options with the cameras, threads and kernel of the map.
 FusionMapperOptions sharpnessOptions(const FusionMapperOptions& options) {
   FusionMapperOptions result;
   result.cameras = options.cameras;

@@ -10,50 +10,50 @@
 
 namespace efm {
 
-/// Two measurements of the same depths: from the motion of the reference camera alone, and from all
-/// cameras within a short time, pixel by pixel. Calibration and poses decide both.
+/// Two measurements of the same depths, pixel by pixel: from the motion of the reference camera
+/// alone, and from all cameras within a short time. Both depend on calibration and poses.
 struct DepthAgreement {
   /// Median of (depth by motion) / (depth by the rig). Right poses and baselines give 1; positions
-  /// in the wrong unit give its factor.
+  /// in a wrong unit give the factor of that unit.
   double scale = 1;
   /// The fraction of the pixels whose ratio is within 15 % of that median.
   double agreeing = 0;
 };
 
-/// @return nothing for one camera, and where too few pixels have both depths: the camera hardly
+/// @return std::nullopt for one camera, or if too few pixels have both depths: the camera hardly
 ///   moves.
 std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
 
-/// How much the depths change with small errors of the poses, as fractions of the depth: the median
-/// over some windows of the median over the pixels.
+/// The changes of the depths with small errors of the poses, as fractions of the depth. Each is the
+/// median over some windows of the median over the pixels.
 struct DepthSensitivity {
-  double per_10_ms = 0;           ///< By a clock that is 10 ms off.
-  double per_percent_travel = 0;  ///< By positions that are scaled by 1 %.
-  double sigma = 0;               ///< The standard deviation that the depths state.
+  double per_10_ms = 0;           ///< Change by a clock that is wrong by 10 ms.
+  double per_percent_travel = 0;  ///< Change by positions that are scaled by 1 %.
+  double sigma = 0;               ///< The standard deviation of the depths by their variance.
 };
 
 /// Maps windows of up to three samples coarsely: as they are, with other clocks, with more travel.
-/// @param options with the window of the map.
-/// @return nothing where too few pixels have depths.
+/// @param options have the window of the map.
+/// @return std::nullopt if too few pixels have depths.
 std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
                                                  const std::vector<WindowSample>& samples,
                                                  const FusionMapperOptions& options);
 
-/// Measures how well poses and rig explain events: the squares of the DSI's confidences (the
-/// largest fused value of each pixel), relative to the number of events. Rays that meet in few
-/// points give few large values. Compares motions of the same events alone.
+/// A measure of how well poses and rig explain events: the sum of the squares of the DSI's
+/// confidences (the largest fused value of each pixel), over the squared number of events. Rays
+/// that meet in few points give few large values. Only motions of the same events can be compared.
 class EventSharpness {
  public:
-  /// @param options of the map: its cameras take part.
+  /// @param options of the map, whose cameras take part.
   EventSharpness(const Rig& rig, const FusionMapperOptions& options);
 
-  /// The largest distance of the reference camera from its position in the middle of the piece,
-  /// metres.
+  /// Returns the largest distance of the reference camera from its position in the middle of the
+  /// piece, metres.
   double shiftIn(const SamplePiece& piece) const;
-  /// @param trajectory of the rig, in place of the piece's own.
-  /// @return 0 where nothing is seen: without a pose, without an event or without parallax.
+  /// Measures a piece. @param trajectory of the rig, instead of the piece's own.
+  /// @return 0 if nothing is seen: without a pose, without an event or without parallax.
   double of(const SamplePiece& piece, const Trajectory& trajectory);
 
  private:

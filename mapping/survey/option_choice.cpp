@@ -13,13 +13,13 @@
 namespace efm {
 namespace {
 
-/// Longer windows have more parallax, and more of the drift of a tracker.
+/// Longer windows have more parallax, but also more tracker drift.
 constexpr double kMaxWindowS = 1;
-/// A scene with less parallax is looked for in a longer window: its depths are mostly noise.
+/// If a scene has less parallax, a longer window is tried: the depths are mostly noise.
 constexpr double kProvenPx = 2;
-/// Where no window has this much, the scene is taken to be as far away as the parallax tells.
+/// If no window has this parallax, the farthest depth that the parallax can show is assumed.
 constexpr double kMinProvenPx = 1;
-/// Windows of a scene with less parallax last longer than others do.
+/// If a scene has less parallax, its windows are made longer.
 constexpr double kWantedPx = 2;
 
 double parallaxBetween(const DepthPlanesOptions& limits, double parallax_px_m) {
@@ -39,7 +39,7 @@ class Choice {
   }
   void depths(double min_m, double max_m, const std::string& reason) {
     DepthPlanesOptions& planes = options_.keyframe.planes;
-    // A limit that is given bounds the other one.
+    // A limit that is given bounds the other limit.
     if (!automatic_.max_depth_m) min_m = std::min(min_m, planes.max_depth_m / 2);
     if (!automatic_.min_depth_m) max_m = std::max(max_m, planes.min_depth_m * 2);
     set(automatic_.min_depth_m, "min_depth_m", planes.min_depth_m, min_m, reason);
@@ -81,7 +81,7 @@ std::string number(double value) {
   return text.str();
 }
 
-/// A number with this many significant digits, for people to read; not above the value.
+/// Returns the value with `digits` significant digits, for people to read, rounded down.
 double roundedDown(double value, int digits) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - digits + 1);
   return std::floor(value / unit * (1 + 1e-9)) * unit;
@@ -91,7 +91,7 @@ double roundedUp(double value, int digits) {
   return std::ceil(value / unit * (1 - 1e-9)) * unit;
 }
 
-/// The longest window in which most of the view stays in sight, seconds.
+/// Returns the longest window in which most of the view stays in sight, seconds.
 double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
                    const FusionMapperOptions& options, const SceneDepths& depths, double max_s) {
   // The view may move by this fraction of its width to either side.
@@ -115,7 +115,7 @@ double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
   return window_s < max_s ? roundedDown(window_s, 1) : max_s;
 }
 
-/// The parallax of a unit of inverse depth in a typical window, pixels per 1/m.
+/// Returns the parallax of a unit of inverse depth in a typical window, pixels per 1/m.
 double parallaxIn(const std::vector<WindowSample>& samples, double window_s, const Rig& rig,
                   const FusionMapperOptions& options) {
   std::vector<double> parallaxes;
@@ -126,7 +126,7 @@ double parallaxIn(const std::vector<WindowSample>& samples, double window_s, con
   return parallaxes.empty() ? 0 : upperMedian(parallaxes);
 }
 
-/// The longest part of a sample.
+/// Returns the duration of the longest sample, seconds.
 double longestOf(const std::vector<WindowSample>& samples) {
   double longest_s = 0;
   for (const WindowSample& sample : samples) {
@@ -172,11 +172,11 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   double max_m = 1 / limits.far;
   std::string reason =
       "the scene lies at " + number(1 / scene.near) + " to " + number(1 / scene.far) + " m";
-  // Where a quarter of a pixel of parallax is a tenth of the depth. It matters for a single camera
-  // that moves little.
+  // The depth at which a quarter of a pixel of parallax is a tenth of the depth. It matters for a
+  // single camera that moves little.
   const double accurate_m = 0.1 / 0.25 * parallax_px_m;
   double most_m = std::max(accurate_m, 2 / depths.median());
-  // A limit right before the scene's far end would gather its depths.
+  // A limit right before the scene's far end would collect the depths of that end.
   if (1 / scene.far < 1.1 * most_m) most_m = std::max(most_m, 1.25 / scene.far);
   if (accurate_m < max_m) {
     max_m = std::min(max_m, most_m);
@@ -200,7 +200,7 @@ void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& option
   if (contradict && automatic.max_depth_m) {
     planes.max_depth_m = kDepthRatio * planes.min_depth_m;
   } else if (contradict && automatic.min_depth_m) {
-    // A valid one: an error is about the limit that was given.
+    // A valid limit: an error must be about the limit that was given.
     planes.min_depth_m = std::max(planes.max_depth_m / kDepthRatio, kMinDepthM);
   }
   KeyframePolicyOptions& policy = options.policy;
@@ -240,7 +240,7 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
     coarseness.nearest_m = std::min(coarseness.nearest_m, given.min_depth_m);
   }
   CoarseSweep sweep(rig, options, coarseness);
-  // Longer windows have more parallax; shorter ones keep the view.
+  // Longer windows have more parallax; shorter windows keep the view.
   SceneDepths depths;
   const double longest_s = longestOf(samples);
   for (const double window_s : {0.2, 0.5, 1.0, 2.0}) {
@@ -281,7 +281,7 @@ namespace {
 
 /// The scene must have moved away from a limit by this factor, so that noise changes nothing.
 constexpr double kTolerance = 1.2;
-/// The change per keyframe: a single keyframe may see something else than the next one.
+/// Maximum change per keyframe: a single keyframe may see another scene than the next keyframe.
 constexpr double kMaxChange = 1.25;
 
 double followed(double limit_m, double wanted_m) {
@@ -290,11 +290,11 @@ double followed(double limit_m, double wanted_m) {
   return limit_m * std::clamp(change, 1 / kMaxChange, kMaxChange);
 }
 
-/// Whether many points lie at a limit that may change.
+/// Returns whether many points lie at a limit that may change.
 bool areAtLimit(const std::vector<double>& inverse, const DepthPlanesOptions& planes,
                 const AutomaticOptions& automatic) {
-  // Evenly spread points: 2 %. Around a scene there are at most 2.4 %, and with much of it beyond a
-  // limit mostly 7 % and more.
+  // Points at a limit: 2 % if evenly spread, at most 2.4 % if the limits lie around the scene, and
+  // mostly 7 % or more if much of the scene lies beyond a limit.
   constexpr double kNear = 0.02;
   constexpr double kMaxFraction = 0.06;
   const double nearest = 1 / planes.min_depth_m;

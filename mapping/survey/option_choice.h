@@ -34,52 +34,52 @@ struct AutomaticOptions {
 
 /// The value that was chosen for an option, and the reason in words.
 struct ChosenOption {
-  std::string key;  ///< "min_depth_m"
+  std::string key;  ///< For example "min_depth_m".
   double value = 0;
   std::string reason;
 };
 
-/// What `chooseOptions` chose.
+/// The result of `chooseOptions`.
 struct OptionChoice {
   std::vector<ChosenOption> options;
   bool found_scene = false;
-  /// The parallax of a unit of inverse depth in a typical window, pixels per 1/m. Without a scene
-  /// the one for which the number of planes would be chosen.
+  /// The parallax of a unit of inverse depth in a typical window, pixels per 1/m. Without a scene,
+  /// it is the parallax for which the number of planes would be chosen.
   double parallax_px_m = 0;
-  /// Whether the parallax proves the depths of the scene. Otherwise the limits are a guess.
+  /// True if the parallax proves the depths of the scene. Otherwise the limits are a guess.
   bool is_proven = false;
 };
 
-/// Gives automatic options values that fit those of the others, until they are chosen.
+/// Sets automatic options to values that fit the other options, until the values are chosen.
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
-/// 100 planes; more where they would be more than a pixel of parallax apart, up to 400; fewer where
-/// they would be less than a tenth of a pixel apart, which nothing can tell, down to 25.
+/// Returns the number of planes: 100; up to 400 if these would be more than a pixel of parallax
+/// apart; down to 25 if they would be less than a tenth of a pixel (unobservable) apart.
 int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m);
 
-/// The options of a first pass over a recording: consecutive windows of `window_s`.
+/// Returns the options of a first pass over a recording: consecutive windows of `window_s`.
 FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
 
 /// Replaces automatic options:
-/// - depth limits: those of nearly all points of a coarse sweep over a wide range, widened;
+/// - depth limits: the range of nearly all points of a coarse sweep over a wide range, widened;
 /// - the window: as long as most of the view stays in sight, up to a second, and a quarter of the
 ///   recording; the stride: half of the window;
-/// - planes: neighbouring ones are about a pixel of parallax apart, over the cameras and the
+/// - planes: neighbouring planes are about a pixel of parallax apart, over the cameras and the
 ///   window's motion.
 /// The same samples give the same choice.
-/// @param duration_s of the recording, as far as events have poses; not given: not known yet.
-/// @param options in: with the values for where nothing can be chosen; out: with the choice.
+/// @param duration_s of the part of the recording with poses; std::nullopt: not known yet.
+/// @param options in: the values that are kept if nothing can be chosen; out: the choice.
 /// @param samples of the recording; may be empty.
 OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
                            const std::vector<WindowSample>& samples,
                            std::optional<double> duration_s, FusionMapperOptions& options);
 
-/// Replaces automatic depth limits by a range that holds nearly every scene, 0.3 to 100 m, where no
-/// scene was found. The other options keep their values.
+/// Replaces automatic depth limits by a range that holds nearly every scene, 0.3 to 100 m. It is
+/// for recordings without a visible scene. The other options keep their values.
 OptionChoice chooseWideDepths(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
-/// Lets automatic depth limits follow the scene from keyframe to keyframe, where nothing is known
-/// of the recording ahead: live operation. Depends on the keyframes alone.
+/// Automatic depth limits that follow the scene from keyframe to keyframe, for live operation,
+/// where the rest of the recording is unknown. They depend on the keyframes alone.
 class DepthFollower {
  public:
   /// @param automatic the options that may change. @param planes of the first keyframe.
@@ -88,12 +88,13 @@ class DepthFollower {
                 double parallax_px_m)
       : automatic_(automatic), planes_(planes), parallax_px_m_(parallax_px_m) {}
 
-  /// @param depth of a keyframe that was mapped with `planes`: metres, 0 where there is none.
+  /// Updates the limits.
+  /// @param depth of a keyframe that was mapped with `planes`: metres; 0: no depth.
   /// @return whether the planes of the next keyframe differ.
   bool follow(const cv::Mat1f& depth);
   const DepthPlanesOptions& planes() const { return planes_; }
-  /// How many keyframes in a row had hardly any point, or many at an automatic limit: the limits
-  /// may not fit the scene.
+  /// Returns the number of consecutive keyframes that had hardly any point, or many points at an
+  /// automatic limit: the limits may not fit the scene.
   int misfits() const { return misfits_; }
 
  private:

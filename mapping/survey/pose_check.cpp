@@ -19,7 +19,7 @@ std::vector<PoseHypothesis> poseHypotheses() {
                    const Eigen::Quaterniond& q = pose.rotation;
                    return Rigid3{{q.x(), q.y(), q.z(), q.w()}, pose.translation};
                  }});
-  // All 23 rotations other than none that map axes to axes.
+  // All 23 rotations that map axes to axes, without the identity.
   std::array<int, 3> order{0, 1, 2};
   do {
     for (unsigned signs = 0; signs < 8; ++signs) {
@@ -38,28 +38,28 @@ std::vector<PoseHypothesis> poseHypotheses() {
 
 namespace {
 
-// Measured on six simulated recordings and a real one, right and with each mistake: the figures are
-// in README.md.
+// Limits. They are measured on six simulated recordings and a real one, without and with each
+// mistake: the gains are in README.md.
 constexpr double kMinGain = 1.15;  // of a mistake that is reported
-// One camera for less than `kShortS`: depths make up for much. Right poses have gains up to 1.3,
-// inverted ones of the real slider 1.98.
+// One camera for less than `kShortS` seconds: depths can hide mistakes. Right poses have gains up
+// to 1.3, the inverted poses of the real slider 1.98.
 constexpr double kMinGainOfShort = 1.5;
 constexpr double kShortS = 0.6;
-// Of a time shift: other times of a smooth motion are much alike. Depths of a single camera follow
-// the noise of poses.
+// Gain of a time shift: a smooth motion is nearly the same at other times. Depths of a single
+// camera follow the noise of poses.
 constexpr double kMinShiftGain = 1.02;
 constexpr double kMinShiftGainOfOne = 1.1;
-constexpr double kMinShiftS = 0.005;  // that is reported
-constexpr double kMaxLatencyS = 0.1;  // of drivers and trackers; a larger shift is another clock
-// Of the best poses from typical wrong ones; of other times, which are much alike.
+constexpr double kMinShiftS = 0.005;  // smallest shift that is reported
+constexpr double kMaxLatencyS = 0.1;  // of drivers and trackers; a larger shift means another clock
+// Gain of the best poses over typical wrong poses; less for time shifts, which change little.
 constexpr double kMinDistinction = 1.45;
 constexpr double kMinShiftDistinction = 1.3;
-constexpr double kMinExplained = 1.25;  // of right poses from typical wrong ones, several cameras
-// Within less, wrong poses differ little from right ones: measured with right ones on parts of the
-// recordings, their gain is up to 0.98 below 0.4 s, 0.80 at 1 s, 0.77 at 1.4 s. Sum of the pieces,
-// which overlap: a recording of 0.7 s has 1.4 s.
+constexpr double kMinExplained = 1.25;  // of right poses over typical wrong poses, several cameras
+// In a shorter time, wrong poses differ little from right poses: their gain, measured on parts of
+// the recordings with right poses, is up to 0.98 below 0.4 s, 0.80 at 1 s, 0.77 at 1.4 s. The time
+// is the sum of the pieces, which overlap: a recording of 0.7 s has 1.4 s.
 constexpr double kMinExplainedS = 1.2;
-constexpr double kEqual = 0.97;       // of the best gain: as good
+constexpr double kEqual = 0.97;       // of the best gain: counts as equal
 constexpr double kBlurred = 1e-6;     // a hundredth of wrong poses' sharpness: no rays meet
 constexpr double kMinShiftM = 0.005;  // within a piece; as the warning `no-motion`
 constexpr double kMaxTimeShiftS = 0.5;
@@ -78,7 +78,7 @@ struct Gains {
     for (const double log : logs) sum += log;
     return logs.empty() ? 1 : std::exp(sum / static_cast<double>(logs.size()));
   }
-  /// Whether most pieces are sharper by half of the gain.
+  /// Returns whether most pieces are sharper by half of the gain.
   bool agree(double min_gain) const {
     const auto better = std::count_if(logs.begin(), logs.end(),
                                       [&](double log) { return log > 0.5 * std::log(min_gain); });
@@ -167,7 +167,7 @@ class PoseCheck {
     candidates_.push_back(inverted);
   }
 
-  /// The gains of a shift of the first `count` pieces, as far as poses cover them.
+  /// Returns the gains of a time shift over those of the first `count` pieces that have all poses.
   Gains gainsOfShift(double shift_s, std::size_t count) {
     Gains gains;
     const std::int64_t shift_ns = durationFromSeconds(shift_s);
@@ -186,7 +186,7 @@ class PoseCheck {
     return gains;
   }
 
-  /// From coarse to fine.
+  /// Searches the best time shift, from coarse to fine.
   void compareTimes() {
     constexpr double kPromising = 1.01;
     Candidate best;
@@ -233,7 +233,7 @@ class PoseCheck {
     for (const Candidate& candidate : candidates_) {
       if (candidate.gains.mean() < kEqual * best_gain || !isClear(candidate)) continue;
       const PoseMistake other = candidate.finding.mistake;
-      if (!finding) {  // the simplest one comes first
+      if (!finding) {  // the simplest mistake comes first
         finding = candidate.finding;
         finding->gain = candidate.gains.mean();
       } else if (other != finding->mistake) {
@@ -256,7 +256,7 @@ class PoseCheck {
            candidate.gains.mean() >=
                (time ? kMinShiftDistinction : kMinDistinction) * typical_wrong_;
   }
-  /// The time from the first to the last event of all pieces.
+  /// Returns the time from the first to the last event of all pieces.
   double seenS() const {
     std::int64_t t0_ns = pieces_.front().window.t0_ns;
     std::int64_t t1_ns = t0_ns;

@@ -20,20 +20,20 @@ enum class PoseMistake {
   kQuaternionOrder,  ///< qx qy qz qw were read from qw qx qy qz.
   kCamerasSwapped,   ///< The events of cameras 0 and 1 are exchanged.
   kStereoInverted,   ///< The transform between cameras 0 and 1 is inverted.
-  kAxes,             ///< The axes of the tracked body are others than the rig's.
+  kAxes,             ///< The tracked body has other axes than the rig.
   kTimeShift,        ///< The clocks of events and poses differ.
-  kUnknown,          ///< The poses do not explain the events; no other mistake would, either.
+  kUnknown,          ///< The poses do not explain the events, and no other mistake does.
 };
 
 /// A mistake about each pose, and how to undo it.
 struct PoseHypothesis {
   PoseMistake mistake = PoseMistake::kUnknown;
-  std::function<Rigid3(const Rigid3&)> T_world_rig;          ///< Of a pose as it is.
-  Eigen::Matrix3d R_body_rig = Eigen::Matrix3d::Identity();  ///< Of `kAxes`.
+  std::function<Rigid3(const Rigid3&)> T_world_rig;          ///< Corrects a pose.
+  Eigen::Matrix3d R_body_rig = Eigen::Matrix3d::Identity();  ///< The rotation of `kAxes`.
 };
 
-/// The simplest first. @return poses inverted, the other order of the quaternion, and all 23
-/// rotations of the axes.
+/// Returns the mistakes, the simplest first: inverted poses, the other order of the quaternion, and
+/// all 23 rotations of the axes.
 std::vector<PoseHypothesis> poseHypotheses();
 
 /// A mistake that would explain why the events are not as sharp as they could be.
@@ -45,14 +45,15 @@ struct PoseFinding {
   std::vector<PoseMistake> alternatives;
   /// `kAxes`: the poses are T_world_body, and T_world_rig = T_world_body * T_body_rig.
   Eigen::Matrix3d R_body_rig = Eigen::Matrix3d::Identity();
-  double shift_s = 0;  ///< `kTimeShift`: to be added to the events' times.
+  double shift_s = 0;  ///< `kTimeShift`: seconds to add to the events' times.
 };
 
-/// Compares how sharp the events of samples are with the poses as they are, and with each mistake
-/// undone. Sharp: many rays meet in few points; see `EventSharpness`. A single camera sees the
-/// direction of the motion alone, and depths can make up for some mistakes: less is found.
-/// @return nothing where the poses explain the events best, where no sample has parallax, and where
-///   the rig hardly moves.
+/// Compares the sharpness of the samples' events with the poses as they are, and with each mistake
+/// undone. Events are sharp if many rays meet in few points; see `EventSharpness`. A single camera
+/// finds fewer mistakes: it sees only the direction of the motion, and wrong depths hide some
+/// mistakes.
+/// @return std::nullopt if the poses explain the events best, if no sample has parallax, or if the
+///   rig hardly moves.
 std::optional<PoseFinding> checkPoses(const Rig& rig, const std::vector<WindowSample>& samples,
                                       const FusionMapperOptions& options);
 

@@ -62,8 +62,7 @@ namespace {
 constexpr double kPieceS = 0.5;
 constexpr std::size_t kPieces = 4;
 
-/// One pose instead of those of 20 ms, their mean: the jitter of a tracker is no mistake that is
-/// looked for.
+/// Replaces the poses of each 20 ms by their mean: tracker jitter is not a mistake to search for.
 Trajectory withoutJitter(const Trajectory& trajectory, const TrajectoryOptions& options) {
   constexpr std::int64_t kIntervalNs = 20'000'000;
   const std::vector<StampedPose>& poses = trajectory.poses();
@@ -88,7 +87,7 @@ Trajectory withoutJitter(const Trajectory& trajectory, const TrajectoryOptions& 
   return mean;
 }
 
-/// The interval that the events of a sample and its poses share.
+/// Returns the interval that the events of a sample and its poses share.
 std::pair<std::int64_t, std::int64_t> coveredBy(const WindowSample& sample,
                                                 const Trajectory& trajectory) {
   const std::vector<StampedPose>& poses = trajectory.poses();
@@ -127,7 +126,8 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
       }
     }
   }
-  // Evenly spread; those in the middle first: they have poses for most time shifts.
+  // The pieces are evenly spread. The pieces in the middle come first: they have poses for most
+  // time shifts.
   std::vector<SamplePiece> chosen;
   const std::size_t count = std::min(kPieces, pieces.size());
   for (const std::size_t i : {1, 2, 0, 3}) {
@@ -138,12 +138,12 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
 
 namespace {
 
-/// Surer points than a map needs: a wrong depth would widen the range.
+/// More certain points than a map needs: a wrong depth would widen the range.
 constexpr double kCoarseQuality = 0.1;
 /// At the nearest plane, the distance of the cameras moves the view by this fraction of its width.
-/// Nearer things are hardly seen twice.
+/// Nearer objects are hardly seen twice.
 constexpr double kNearestMove = 0.5;
-constexpr double kFarthestParallaxPx = 0.5;  // beyond it, depth cannot be told from infinity
+constexpr double kFarthestParallaxPx = 0.5;  // beyond it, depth is the same as infinity
 constexpr int kMaxCoarsePlanes = 400;
 
 FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
@@ -226,8 +226,8 @@ InverseRange denseRange(const SceneDepths& depths) {
 InverseRange limitsAround(const InverseRange& scene) {
   constexpr double kMinMargin = 1.25;
   constexpr double kMinRatio = 10;
-  // Room in front of the scene shows ambiguous peaks; room behind it has the wrong points of weak
-  // parallax, too.
+  // Space in front of the scene shows ambiguous peaks. Space behind the scene also has the wrong
+  // points of weak parallax.
   constexpr double kFarExponent = 0.75;
   const double margin = std::sqrt(kMinRatio * scene.far / scene.near);
   return {scene.far / std::max(kMinMargin, std::pow(margin, kFarExponent)),
