@@ -91,9 +91,9 @@ struct MapperCounts {
   MapperCounts& operator+=(const MapperCounts& other);
 };
 
-/// Maps events and poses to keyframes: buffers the input, and maps a window as soon as its events
-/// and poses are complete. Deterministic: keyframes depend on the data alone, not on its packets.
-/// Not thread-safe.
+/// Maps events and poses to keyframes: buffers the input, and maps a window once its events and
+/// poses are complete. Deterministic: keyframes depend on the data, not on its packets. Not
+/// thread-safe.
 ///
 /// Use: `addCamera` for each camera; then `addPose` and `addEvents` as data arrives, and after each
 /// call `next` until it returns std::nullopt; at the end `finish`, and `next` again.

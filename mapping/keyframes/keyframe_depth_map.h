@@ -61,8 +61,7 @@ struct EventImage {
   cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: negative, positive events.
 };
 
-/// Counts a camera's events per pixel.
-/// @param camera has events inside the sensor only: `KeyframeMapper` rejects other events.
+/// Counts events per pixel. All lie inside the sensor: `KeyframeMapper` rejects other events.
 EventImage eventImageOf(const CameraEvents& camera);
 
 /// Returns the reference camera's events as an image that fits on the depth map: undistorted, and

@@ -99,8 +99,8 @@ class KeyframePolicy {
   /// Returns the current window, as soon as the recording certainly fills it.
   /// @return std::nullopt before that time, and after the last window.
   virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
-  /// Returns a full window that ends with a recording that has ended, if enough of it is in no
-  /// other window (`kLeastAdded`).
+  /// Returns a full window at the end of a finished recording, if enough of it is new
+  /// (`kLeastAdded`).
   /// @param end_ns right after the last event with a pose.
   /// @return std::nullopt also if that window would begin before the recording.
   virtual std::optional<Window> last(const RecordingProgress& recording,
@@ -109,8 +109,7 @@ class KeyframePolicy {
   virtual std::int64_t earliestLast(const RecordingProgress& recording) const {
     return earliestStart(recording);
   }
-  /// Returns the time before which no later window needs events. Poses are needed from
-  /// `earliestReference` on.
+  /// Returns the time before which no later window needs events (poses: `earliestReference`).
   virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
   virtual std::int64_t earliestReference(const RecordingProgress& recording) const {
     return earliestStart(recording);

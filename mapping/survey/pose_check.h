@@ -50,8 +50,7 @@ struct PoseFinding {
 
 /// Compares the sharpness of the samples' events with the poses as they are, and with each mistake
 /// undone. Events are sharp if many rays meet in few points; see `EventSharpness`. A single camera
-/// finds fewer mistakes: it sees only the direction of the motion, and wrong depths hide some
-/// mistakes.
+/// finds fewer mistakes: it sees only the direction of the motion, and depths may hide mistakes.
 /// @return std::nullopt if the poses explain the events best, if no sample has parallax, or if the
 ///   rig hardly moves.
 std::optional<PoseFinding> checkPoses(const Rig& rig, const std::vector<WindowSample>& samples,

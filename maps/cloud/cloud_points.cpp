@@ -17,7 +17,7 @@ namespace efm {
 
 namespace {
 
-/// For messages, with all digits: "(1, 2.5, -3)".
+/// Returns a text for messages, with all digits: "(1, 2.5, -3)".
 std::string positionText(const CloudPoint& point) {
   NumberText text;
   text << "(" << point.p_world.x() << ", " << point.p_world.y() << ", " << point.p_world.z() << ")";

@@ -20,21 +20,21 @@ struct CloudPoint {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< Metres, frame `world`.
   float confidence = 0;                               ///< Fused ray density at the point, above 0.
   std::uint32_t support = 1;                          ///< Number of keyframes that saw it.
-  /// Of a global cloud: the lowest number of a keyframe that saw it.
+  /// In a global cloud, the lowest number of a keyframe that saw the point.
   std::uint64_t first_keyframe = 0;
-  /// Standard deviation of depth, metres; NaN where it is not known.
+  /// Standard deviation of depth, metres; NaN if it is not known.
   float sigma = std::numeric_limits<float>::quiet_NaN();
 };
 
-/// For messages, with all digits: "(1, 2.5, -3) with confidence 7".
+/// Returns a text for messages, with all digits: "(1, 2.5, -3) with confidence 7".
 std::string pointText(const CloudPoint& point);
 
 struct OutlierRemovalOptions {
-  /// Points with too few others within this distance are removed. Metres; 0 (no point is removed)
-  /// or 1e-6 to 1e6. There is no default distance, because it depends on the depth of the scene.
+  /// Points with too few neighbours within this distance are removed. Metres; 0 (no point is
+  /// removed) or 1e-6 to 1e6. There is no default: it depends on the depth of the scene.
   double outlier_radius_m = 0;
-  /// A point is kept with at least this number of others within the radius. Range: 1 to 10000. The
-  /// default is that of the published code of EMVS (Rebecq et al., IJCV 2018).
+  /// A point is kept if at least this number of other points lie within the radius. Range: 1 to
+  /// 10000. The default is that of the published code of EMVS (Rebecq et al., IJCV 2018).
   int outlier_min_neighbors = 3;
 
   template <typename Self, typename Visit>
@@ -47,8 +47,8 @@ struct OutlierRemovalOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// The points that are not isolated, in the same order. Use it on the cloud of one keyframe before
-/// it is merged with others: no edge of its depth map supports an isolated point.
+/// Returns the points that are not isolated, in the same order. Use it on the cloud of one keyframe
+/// before the cloud is merged with others: no edge of its depth map supports an isolated point.
 ///
 /// Distances are computed in float, relative to the median position: they are exact to 1e-7 of the
 /// extent of the cloud at any distance from the origin of the world.
@@ -57,11 +57,11 @@ std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
 
 // The searches of PCL. They work on floats, which are precise near the origin only.
 
-/// The median of each coordinate. Few points far away do not move it, unlike the mean.
+/// Returns the median of each coordinate. A few points far away do not move it, unlike the mean.
 /// @param points at least one.
 Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points);
 
-/// The positions relative to `origin`, in the same order.
+/// Returns the positions relative to `origin`, in the same order.
 std::vector<Eigen::Vector3f> offsetsFrom(const Eigen::Vector3d& origin,
                                          const std::vector<CloudPoint>& points);
 

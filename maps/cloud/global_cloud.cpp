@@ -22,7 +22,7 @@ namespace {
   throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
 }
 
-/// Bits for the keyframes with lower numbers; as many for those with higher ones.
+/// Number of bits for the keyframes with lower numbers, and for those with higher numbers.
 constexpr unsigned kLowerBits = GlobalCloud::kMaxNumberDifference;
 
 void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) {
@@ -31,12 +31,12 @@ void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) {
                               ": the keyframes around it are merged for good");
 }
 
-/// The first number of `SettledVoxel::recent`.
+/// Returns the first number of `SettledVoxel::recent`.
 std::uint64_t recentFrom(std::uint64_t below) {
   return below < kLowerBits ? 0 : below - kLowerBits;
 }
 
-/// The bit of keyframe `by` in the verdicts of keyframe `checked`. Ascending with the number.
+/// Returns the bit of keyframe `by` in the verdicts of keyframe `checked`. It ascends with `by`.
 unsigned bitOf(std::uint64_t by, std::uint64_t checked) {
   return by < checked ? kLowerBits - static_cast<unsigned>(checked - by)
                       : kLowerBits - 1 + static_cast<unsigned>(by - checked);
@@ -88,7 +88,7 @@ void GlobalCloud::replace(std::uint64_t keyframe, const std::vector<CloudPoint>&
   checkMutually(keyframe);
 }
 
-/// The inliers of a keyframe, not yet checked by others.
+/// Makes a keyframe of the inliers, not yet checked by other keyframes.
 GlobalCloud::Keyframe GlobalCloud::keyframeOf(const std::vector<CloudPoint>& points,
                                               const std::optional<Rigid3>& T_world_ref) const {
   const std::vector<CloudPoint> inliers = removeOutliers(points, options_.outliers);
@@ -100,12 +100,12 @@ GlobalCloud::Keyframe GlobalCloud::keyframeOf(const std::vector<CloudPoint>& poi
   return keyframe;
 }
 
-/// The sums of each voxel, sorted.
+/// Returns the sums of each voxel, sorted by voxel.
 std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoint>& points) const {
   std::vector<VoxelPoint> located;
   located.reserve(points.size());
   for (const CloudPoint& point : points) located.push_back(voxelPointOf(point));
-  // Stable: the points of a voxel are summed in their given order.
+  // The sort is stable: the points of a voxel are summed in their given order.
   std::stable_sort(located.begin(), located.end(),
                    [](const VoxelPoint& a, const VoxelPoint& b) { return a.index < b.index; });
 
@@ -118,7 +118,7 @@ std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoin
   return voxels;
 }
 
-/// Calls visit(number, keyframe) for the keyframes with a number near this one.
+/// Calls visit(number, keyframe) for the keyframes with a number near `number`.
 template <typename Visit>
 void GlobalCloud::visitNeighbors(std::uint64_t number, const Visit& visit) {
   constexpr std::uint64_t kMax = kMaxNumberDifference;
@@ -129,7 +129,7 @@ void GlobalCloud::visitNeighbors(std::uint64_t number, const Visit& visit) {
   }
 }
 
-/// Sets the bit in the verdicts of `checked`, wherever `by` supports or contradicts a voxel.
+/// Sets the bit in the verdicts of `checked` on each voxel that `by` supports or contradicts.
 void GlobalCloud::check(Keyframe& checked, const Keyframe& by, unsigned bit) const {
   if (!by.grid) return;
   for (std::size_t i = 0; i < checked.voxels.size(); ++i) {
@@ -176,9 +176,9 @@ bool GlobalCloud::isExcluded(const Keyframe& keyframe, std::size_t voxel) const 
          violations > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
-/// Merges the sorted voxels of the settled keyframes and of those below a number, and calls
-/// visit(voxel) for each in order. The keyframes of a voxel are summed in the order of their
-/// numbers.
+/// Merges the sorted voxels of the finalized keyframes and of the keyframes below a number, and
+/// calls visit(voxel) for each voxel in order. The keyframes of a voxel are summed in the order of
+/// their numbers.
 template <typename Visit>
 void GlobalCloud::visitVoxels(std::uint64_t below, const Visit& visit) const {
   struct Run {
@@ -286,7 +286,7 @@ GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const
   if (!(point.confidence > 0) || !std::isfinite(point.confidence)) {
     refusePoint(point, "the confidence must be finite and above 0");
   }
-  // 2^63 is a double, the largest 64-bit integer is not.
+  // 2^63 is exact in double, the largest 64-bit integer is not.
   constexpr double kIndexLimit = 9223372036854775808.0;
   const Eigen::Vector3d cell = (point.p_world / options_.voxel_size_m).array().floor();
   if (!(cell.minCoeff() >= -kIndexLimit && cell.maxCoeff() < kIndexLimit)) {

@@ -21,11 +21,11 @@ struct GlobalCloudOptions {
   /// Edge of a voxel in metres; the points in a voxel are merged. Range: 1e-6 to 1000. The default
   /// suits a desk, where depth planes are about a centimetre apart.
   double voxel_size_m = 0.01;
-  /// Points with less support are not exported. Range: at least 1, which keeps all of them.
+  /// Points with less support are not exported. Range: at least 1, which keeps all points.
   int min_keyframes = 1;
   /// Points of a keyframe that are not inserted.
   OutlierRemovalOptions outliers = {};
-  /// How keyframes check the points of other keyframes.
+  /// The way in which keyframes check the points of other keyframes.
   ConsistencyOptions consistency = {};
 
   template <typename Self, typename Visit>
@@ -49,9 +49,9 @@ struct GlobalCloudOptions {
 ///
 /// The sigma of a voxel is that of its mean position, p = sum(w_i p_i) / sum(w_i). The depths of a
 /// keyframe in a voxel come from the same edge, events and poses: their errors are taken as fully
-/// correlated, so many of them are not more exact than one. Those of two keyframes are taken as
+/// correlated, so many of them are not more exact than one. Errors of two keyframes are taken as
 /// independent. So sigma = sqrt(sum over keyframes of (sum of w_i sigma_i)^2) / sum(w_i). It is NaN
-/// where the sigma of a point is not known.
+/// if the sigma of a point is not known.
 ///
 /// Two keyframes whose numbers differ by at most `kMaxNumberDifference` check each other's points
 /// (VisibilityGrid). Each voxel of a keyframe has two bits per other keyframe: one for support, one
@@ -74,37 +74,37 @@ class GlobalCloud {
 
   /// Inserts the points of a keyframe without their outliers (`removeOutliers` on this keyframe
   /// alone). Cost: sorting the points, and checking them against at most 16 keyframes.
-  /// @param keyframe its number; unique in the map.
-  /// @param T_world_ref pose of the view that saw the points. Without it the keyframe does not
-  /// check the points of others.
-  /// @throws std::invalid_argument where the number is in the map, a point is not finite, or an
-  /// inlier has a confidence that is not above 0 or lies outside the range of voxel indices. The
-  /// map is unchanged then.
+  /// @param keyframe the number of the keyframe; unique in the map.
+  /// @param T_world_ref pose of the view that saw the points. Without a pose, the keyframe does not
+  /// check the points of other keyframes.
+  /// @throws std::invalid_argument if the number is in the map, a point is not finite, or an inlier
+  /// has a confidence that is not above 0 or lies outside the range of voxel indices. Then the map
+  /// is unchanged.
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
               const std::optional<Rigid3>& T_world_ref = std::nullopt);
 
   /// Replaces the points and the pose of a keyframe, as `remove` and `insert` do.
-  /// @throws std::invalid_argument as they do. The map is unchanged then.
+  /// @throws std::invalid_argument as `remove` and `insert`. Then the map is unchanged.
   void replace(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
                const std::optional<Rigid3>& T_world_ref);
 
   /// Removes a keyframe. The map is as if it had never been inserted, and the number is free again.
-  /// Cost: linear in the points of the keyframe and of those that it checked.
+  /// Cost: linear in the points of the keyframe and of the keyframes that it checked.
   void remove(std::uint64_t keyframe);
 
-  /// Merges the keyframes below a number for good, so that memory and the cost of `points` grow
-  /// with the voxels of the map, not with its keyframes. The map stays the same, bit for bit. Cost:
-  /// linear in the merged voxels.
+  /// Finalizes the keyframes below a number: merges them for good, so that memory and the cost of
+  /// `points` grow with the voxels of the map, not with its keyframes. The map stays the same, bit
+  /// for bit. Cost: linear in the merged voxels.
   /// @param below all keyframes below `below` + `kMaxNumberDifference` are in the map, or never
-  /// will be: `insert` refuses them from now on, `remove` and `replace` those below `below`. The
-  /// others of them may be changed, but what they said of merged points stays.
+  /// will be: from now on `insert` rejects them, and `remove` and `replace` reject the keyframes
+  /// below `below`. Keyframes from `below` on may change, but their verdicts on merged points stay.
   void settle(std::uint64_t below);
-  /// The number of voxels that `settle` merged, and of those that it would merge.
+  /// The numbers of voxels that `settle` has merged, and that it would merge.
   std::size_t settledVoxels() const { return settled_.size(); }
   std::size_t unsettledVoxels(std::uint64_t below) const;
 
-  /// The points with a support of at least `min_keyframes`, sorted by voxel (x, y, z). Cost:
-  /// merging the voxels of all keyframes.
+  /// Returns the points with a support of at least `min_keyframes`, sorted by voxel (x, y, z).
+  /// Cost: merging the voxels of all keyframes.
   MapCloud::ConstPtr points() const { return points(options_.min_keyframes); }
   MapCloud::ConstPtr points(int min_keyframes) const;
 
@@ -132,14 +132,14 @@ class GlobalCloud {
     std::uint64_t count = 0;
     double weight = 0;
     Eigen::Vector3d weighted_offset = Eigen::Vector3d::Zero();
-    /// Of one keyframe the sum of weighted sigmas, of several the root of the sum of its squares.
+    /// For one keyframe, the sum of weighted sigmas; for several, the root of its summed squares.
     double weighted_sigma = 0;
 
     void add(const VoxelPoint& point);
     void add(const Sums& other);
   };
 
-  /// What other keyframes found about a voxel: a bit for each of the 8 numbers below and above.
+  /// Verdicts of other keyframes on a voxel: a bit for each of the 8 numbers below and above.
   struct Verdicts {
     std::uint16_t supports = 0;
     std::uint16_t free_space_violations = 0;
@@ -147,17 +147,16 @@ class GlobalCloud {
   struct Keyframe {
     std::vector<Sums> voxels;            // sorted
     std::vector<Verdicts> verdicts;      // one per voxel; empty without consistency
-    std::optional<VisibilityGrid> grid;  // with consistency, where the pose is known
+    std::optional<VisibilityGrid> grid;  // with consistency, if the pose is known
   };
 
-  /// A voxel of settled keyframes. Keyframes that support it are counted, and those whose numbers
-  /// are near the first one that is not settled are known, because others may support it by them
-  /// too.
+  /// A voxel of finalized keyframes. Its supporting keyframes are counted. The numbers near the
+  /// first keyframe that is not final are known, because later keyframes may add the same supports.
   struct SettledVoxel {
     Sums sums;
-    std::uint64_t first = 0;   ///< The lowest number that supports it.
-    std::uint32_t older = 0;   ///< Keyframes below `settled_below_` - kMaxNumberDifference.
-    std::uint16_t recent = 0;  ///< A bit for each number from there on.
+    std::uint64_t first = 0;   ///< The lowest number of a keyframe that supports it.
+    std::uint32_t older = 0;   ///< Supporters below `settled_below_` - kMaxNumberDifference.
+    std::uint16_t recent = 0;  ///< Supporters: a bit for each number from there on.
   };
   /// A voxel of all keyframes.
   struct MergedVoxel {
@@ -185,9 +184,9 @@ class GlobalCloud {
   void visitVoxels(std::uint64_t below, const Visit& visit) const;
 
   GlobalCloudOptions options_;
-  std::map<std::uint64_t, Keyframe> keyframes_;  // by number; those that are not settled
+  std::map<std::uint64_t, Keyframe> keyframes_;  // by number; without the finalized keyframes
   std::vector<SettledVoxel> settled_;            // sorted
-  std::uint64_t settled_below_ = 0;              // keyframes below this number are settled
+  std::uint64_t settled_below_ = 0;              // keyframes below this number are final
   std::size_t settled_keyframes_ = 0;
 };
 

@@ -10,7 +10,7 @@
 namespace efm {
 namespace {
 
-/// NaN where the peak has no curvature, or the map has no variances.
+/// Returns the sigma of a depth; NaN if the peak has no curvature or the map has no variances.
 float sigmaOf(const DepthMap& map, int x, int y) {
   const float variance = map.variance.empty() ? INFINITY : map.variance(y, x);
   if (!std::isfinite(variance)) return std::numeric_limits<float>::quiet_NaN();
@@ -68,7 +68,7 @@ MapCloud::ConstPtr keyframeCloud(const KeyframeDepthMap& keyframe, double resolu
 
 namespace {
 
-/// The maximum distance by which a motion moves a point within a radius.
+/// Returns the maximum distance by which a motion moves a point within a radius.
 double maxMotion(const Rigid3& from, const Rigid3& to, double radius_m) {
   return (from.translation - to.translation).norm() +
          radius_m * from.rotation.angularDistance(to.rotation);
@@ -104,10 +104,10 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
   settle();
 }
 
-/// When enough voxels have gathered, merges the keyframes that cannot change any more: neither they
-/// nor those that check them may move from now on.
+/// If there are enough voxels, finalizes the keyframes that cannot change any more: neither they
+/// nor the keyframes that check them may move from now on.
 void RefinedCloud::settle() {
-  constexpr std::size_t kMinVoxels = 200'000;  // some 15 MB
+  constexpr std::size_t kMinVoxels = 200'000;  // about 15 MB
   constexpr std::uint64_t kCheckers = GlobalCloud::kMaxNumberDifference;
   const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
   if (newest < movable_ || newest - movable_ < kCheckers) return;
@@ -148,7 +148,7 @@ void RefinedCloud::move(std::map<std::size_t, Rigid3> T_world_ref) {
                                 (movable_ > 0 ? "it is not in the cloud" : "keyframes are fixed"));
   }
   T_world_ref.erase(T_world_ref.begin(), T_world_ref.lower_bound(frozen_));
-  T_world_ref.merge(pending_);  // a new request replaces an earlier one
+  T_world_ref.merge(pending_);  // a new request replaces an earlier request
   pending_ = std::move(T_world_ref);
 }
 
@@ -168,7 +168,7 @@ void RefinedCloud::applyPending(double tolerance_m, std::size_t max_count) {
       try {
         put(keyframe, T_world_ref);
       } catch (const std::invalid_argument&) {
-        pending_.erase(next);  // it would be refused again
+        pending_.erase(next);  // it would be rejected again
         throw;
       }
       ++moved;

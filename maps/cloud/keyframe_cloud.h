@@ -16,31 +16,31 @@
 
 namespace efm {
 
-/// A point of a keyframe in its reference view. Float like the depth map, so a stored keyframe has
-/// exactly the points of the map, anywhere in the world.
+/// A point of a keyframe in its reference view. It is float like the depth map, so a stored
+/// keyframe has exactly the points of the map, anywhere in the world.
 struct ViewPoint {
   Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();  ///< Metres, frame `ref`.
   float confidence = 0;                             ///< Fused ray density at the point, above 0.
-  /// Standard deviation of depth, metres; NaN where it is not known.
+  /// Standard deviation of depth, metres; NaN if it is not known.
   float sigma = std::numeric_limits<float>::quiet_NaN();
 };
 
-/// The points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth and a
-/// confidence above 0, row by row. sigma_Z = Z^2 * sigma_(1/Z): Z is the inverse of the inverse
-/// depth, whose variance the keyframe has.
+/// Returns the points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth
+/// and a confidence above 0, row by row. sigma_Z = Z^2 * sigma_(1/Z): Z is the inverse of the
+/// inverse depth, whose variance the keyframe has.
 std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 
-/// The points of the single cameras of a keyframe, one camera after the other: late fusion, the
-/// baseline for fused DSIs (Ghosh and Gallego 2022, Sec. 3.3.1). Empty where the keyframe has no
+/// Returns the points of the single cameras of a keyframe, one camera after the other: late fusion,
+/// the baseline for fused DSIs (Ghosh and Gallego 2022, Sec. 3.3.1). Empty if the keyframe has no
 /// maps of single cameras.
 /// @throws std::invalid_argument as `viewPoints` does.
 std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe);
 
-/// p_world = T_world_ref * p_ref, each with a support of 1.
+/// Returns the points p_world = T_world_ref * p_ref, each with a support of 1.
 std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref);
 
-/// `viewPoints` in the world, as a cloud of PCL.
+/// Returns `viewPoints` in the world, as a cloud of PCL.
 /// @param resolution_m see `mapCloudOf`.
 MapCloud::ConstPtr keyframeCloud(const KeyframeDepthMap& keyframe, double resolution_m = 0.01);
 
@@ -51,8 +51,8 @@ class RefinedCloud {
  public:
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-  /// @param movable how many of the newest keyframes may move, at least; 0: none may. Their points
-  /// are kept, 20 bytes each.
+  /// @param movable minimum number of newest keyframes that may move; 0: none may. Their points are
+  /// kept, 20 bytes each.
   RefinedCloud(const GlobalCloudOptions& options, std::size_t movable)
       : cloud_(options), movable_(movable) {}
 
@@ -65,18 +65,18 @@ class RefinedCloud {
   void removeNewest();
 
   /// Requests new poses for keyframes, by their numbers. `applyPending` moves them. A request for a
-  /// keyframe that cannot move any more is dropped: it keeps its last pose.
-  /// @throws std::invalid_argument where a keyframe was not inserted, or keyframes are not movable.
-  /// Nothing is requested then.
+  /// keyframe that cannot move any more is dropped: the keyframe keeps its last pose.
+  /// @throws std::invalid_argument if a keyframe was not inserted, or keyframes are not movable.
+  /// Then nothing is requested.
   void move(std::map<std::size_t, Rigid3> T_world_ref);
-  /// Moves keyframes to their requested poses where a point is off by more than the tolerance: the
-  /// oldest first, and at most `max_count` of them. A tolerance of 0 moves all, bit for bit.
-  /// @throws std::invalid_argument as GlobalCloud::insert does. That keyframe keeps its old pose,
-  /// and its request is dropped.
+  /// Moves keyframes to their requested poses if a point is wrong by more than the tolerance: the
+  /// oldest keyframe first, at most `max_count` keyframes. A tolerance of 0 moves all, bit for bit.
+  /// @throws std::invalid_argument as GlobalCloud::insert does. Then that keyframe keeps its old
+  /// pose, and its request is dropped.
   void applyPending(double tolerance_m, std::size_t max_count = kAll);
 
   const GlobalCloud& cloud() const { return cloud_; }
-  /// The poses of the keyframes in the cloud, without those of an earlier map.
+  /// The poses of the keyframes in the cloud, without the keyframes of an earlier map.
   const std::vector<Rigid3>& T_world_ref() const { return T_world_ref_; }
 
  private:
@@ -95,7 +95,7 @@ class RefinedCloud {
   std::size_t fixed_ = 0;   // keyframes of an earlier map
   std::size_t frozen_ = 0;  // the first keyframes, which cannot move any more
   std::vector<Rigid3> T_world_ref_;
-  std::vector<KeptPoints> kept_;  // one per T_world_ref_ where keyframes move; frozen: none
+  std::vector<KeptPoints> kept_;           // one per T_world_ref_ if keyframes move; frozen: none
   std::map<std::size_t, Rigid3> pending_;  // requested poses
 };
 

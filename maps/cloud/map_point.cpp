@@ -27,7 +27,7 @@ std::optional<double> coarseStepAt(const Points& points, Position position_of,
   return step_m > 0.1 * resolution_m ? std::optional(step_m) : std::nullopt;
 }
 
-/// The origin of a cloud's points.
+/// Returns the origin of a cloud's points.
 Eigen::Vector3d originOf(const std::vector<CloudPoint>& points, double resolution_m) {
   const auto position_of = [](const CloudPoint& point) { return point.p_world; };
   if (!coarseStepAt(points, position_of, resolution_m)) return Eigen::Vector3d::Zero();

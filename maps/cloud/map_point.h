@@ -19,7 +19,7 @@ struct PointXYZI;
 namespace efm {
 
 /// A point of a map, registered as a point type of PCL: x, y, z, intensity, support and sigma are
-/// its fields in PCL's files. PCL's own templates compile for it where PCL_NO_PRECOMPILE is defined
+/// its fields in PCL's files. PCL's own templates compile for it if PCL_NO_PRECOMPILE is defined
 /// before the first header of PCL.
 ///
 /// The members of PCL_ADD_POINT4D are written out: the header of that macro takes 2 s to compile.
@@ -32,9 +32,9 @@ struct EIGEN_ALIGN16 MapPoint {
   };
   float intensity = 0;        ///< The confidence: fused ray density at the point.
   std::uint32_t support = 1;  ///< Number of keyframes that saw it.
-  /// Standard deviation of its depth, metres; NaN where it is not known. See GlobalCloud.
+  /// Standard deviation of its depth, metres; NaN if it is not known. See GlobalCloud.
   float sigma = std::numeric_limits<float>::quiet_NaN();
-  std::uint32_t first_keyframe = 0;  ///< The lowest number of a keyframe that saw it; no field.
+  std::uint32_t first_keyframe = 0;  ///< Lowest number of a keyframe that saw it; no field.
 
   auto getVector3fMap() { return Eigen::Vector3f::Map(data); }
   auto getVector3fMap() const { return Eigen::Vector3f::Map(data); }
@@ -48,26 +48,27 @@ struct EIGEN_ALIGN16 MapPoint {
 };
 
 /// The cloud of a map or of a keyframe. `sensor_origin_` is the origin of its points in the world:
-/// 0, or far from there (`mapCloudOf`) a position nearby. `sensor_orientation_` is the identity.
+/// 0, or if they are far away, a position near them (`mapCloudOf`). `sensor_orientation_` is the
+/// identity.
 using MapCloud = pcl::PointCloud<MapPoint>;
 
-/// p_world of a point.
+/// Returns p_world of a point, metres.
 inline Eigen::Vector3d positionIn(const MapCloud& cloud, const MapPoint& point) {
   return cloud.sensor_origin_.head<3>().cast<double>() + point.getVector3fMap().cast<double>();
 }
 
-/// The points in their order. Where floats are too coarse for them (`coarseStepOf`), their origin
-/// is the median position, rounded to a power of ten that is fine enough itself: it has few digits,
-/// as PCL's programs write at most six.
+/// Returns the points in their order. If floats are too coarse for the points (`coarseStepOf`),
+/// their origin is the median position, rounded to a multiple of a power of ten that is fine enough
+/// itself. So it has few digits: PCL's programs write at most six.
 /// @param resolution_m for example the size of a voxel; above 0.
 MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m);
 
-/// The step of floats at the world coordinates of a map, where it is more than a tenth of the
-/// resolution: where programs round points that take them as floats. At 99.9 % of the points: a few
-/// wrong ones may lie anywhere.
+/// Returns the step of floats at the world coordinates of a map, metres, if it is more than a tenth
+/// of the resolution: programs that use floats round these points. Considers 99.9 % of the points,
+/// as a few wrong points may lie anywhere.
 std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m);
 
-/// For functions of PCL that take this type alone. Relative to the same `sensor_origin_`.
+/// Converts a map for functions of PCL that take this type alone, with the same `sensor_origin_`.
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud);
 
 }  // namespace efm

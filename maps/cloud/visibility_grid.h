@@ -14,29 +14,28 @@
 
 namespace efm {
 
-/// How keyframes check each other's points.
+/// The way in which keyframes check each other's points.
 enum class Consistency {
   kNone,        ///< No check: only points in the same voxel support each other.
-  kSupport,     ///< A keyframe supports a point of another one where it has a point, too.
-  kVisibility,  ///< As kSupport; free-space violations without support are excluded.
+  kSupport,     ///< A keyframe supports another one's point if it has a point there, too.
+  kVisibility,  ///< As kSupport; points that violate free space without support are excluded.
 };
 
 std::string_view nameOf(Consistency consistency);
 Consistency consistencyFromName(std::string_view name);
 
 struct ConsistencyOptions {
-  /// Keyframes measure depth from different events. Their correct depths agree, wrong ones seldom
+  /// Keyframes measure depth from different events. Their correct depths agree, wrong depths seldom
   /// do.
   Consistency consistency = Consistency::kVisibility;
   /// The maximum difference in inverse depth between a point and its support, as a fraction of the
   /// maximum inverse depth in view. A point that is nearer than all points around it by more than
-  /// twice the tolerance is a free-space violation. Range: 0.001 to 1. One of 100 depth planes is
-  /// 0.01.
+  /// twice the tolerance is a free-space violation. Range: 0.001 to 1. One plane of 100 is 0.01.
   double consistency_tolerance = 0.03;
   /// Side of the cells of the visibility grid, as an angle. Range: 0.01 to 10. A point is compared
-  /// with its cell and the eight adjacent ones, which must cover the errors of the poses.
+  /// with its cell and the eight adjacent cells, which must be larger than the errors of the poses.
   double consistency_cell_deg = 0.5;
-  /// A point without support is excluded where it has more free-space violations. Range: 0 to 16.
+  /// Maximum free-space violations of a point without support; more exclude it. Range: 0 to 16.
   int max_contradictions = 0;
 
   template <typename Self, typename Visit>
@@ -51,26 +50,26 @@ struct ConsistencyOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// What a keyframe finds about a point of another one.
+/// The verdict of a keyframe on a point of another keyframe.
 enum class Verdict {
-  kUnknown,             ///< It has no points there, or nearer ones that hide the point.
-  kSupports,            ///< It has a point there, too.
-  kFreeSpaceViolation,  ///< Its own points are all well behind: the space of the point is free.
+  kUnknown,             ///< The keyframe has no points there, or nearer points that hide it.
+  kSupports,            ///< The keyframe has a point there, too.
+  kFreeSpaceViolation,  ///< All points of the keyframe are well behind: the space is free.
 };
 
 /// The visible points of a keyframe, to check the points of other keyframes: the minimum and the
 /// maximum depth in each cell of a grid over its view (x / z and y / z of frame `ref`). It is built
 /// from the points and the pose alone, so a stored keyframe gives the same grid. Therefore the
-/// tolerance depends on the depths, not on a variance per point. 12 bytes a cell.
+/// tolerance depends on the depths, not on a variance per point. 12 bytes per cell.
 class VisibilityGrid {
  public:
   /// @param points in the world; points behind the view are ignored.
   VisibilityGrid(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
                  const ConsistencyOptions& options);
 
-  /// Compares the inverse depth of a point with its cell and the eight adjacent ones. A depth
-  /// within the tolerance supports the point. The point violates free space where at least two
-  /// cells have depths and it is nearer than all of them by more than twice the tolerance.
+  /// Compares the inverse depth of a point with its cell and the eight adjacent cells. A depth
+  /// within the tolerance supports the point. The point violates free space if at least two cells
+  /// have depths and it is nearer than all these depths by more than twice the tolerance.
   Verdict verdictOn(const Eigen::Vector3d& p_world) const;
 
  private:

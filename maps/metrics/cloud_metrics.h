@@ -10,8 +10,8 @@
 
 namespace efm {
 
-/// The distance of each point to the nearest of the others, metres, in the order of the points.
-/// Cost: a k-d tree over the others, and a search per point.
+/// Returns the distance of each point to the nearest of the other points, metres, in the order of
+/// `points`. Cost: a k-d tree over the other points, and a search per point.
 std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
                                      const std::vector<CloudPoint>& others);
 
@@ -24,7 +24,7 @@ struct CloudErrors {
   double accuracy_p90_m = 0;
   /// Distances from the true points to the map, metres.
   SampleStatistics completeness_distance;
-  double completeness_distance_p90_m = 0;  ///< 90 % of the true points are within it.
+  double completeness_distance_p90_m = 0;  ///< 90 % of the true points are within this distance.
 
   /// The results at one distance d.
   struct Step {
@@ -33,18 +33,18 @@ struct CloudErrors {
     double outliers = 0;      ///< Fraction of the map farther than d from the truth.
     double completeness = 0;  ///< Fraction of the truth at most d from the map (Seitz et al.).
     double f1 = 0;            ///< Harmonic mean of `within` and `completeness` (Knapitsch et al.,
-                              ///< SIGGRAPH 2017, "F-score"); 0 where both are 0.
+                              ///< SIGGRAPH 2017, "F-score"); 0 if both are 0.
   };
   std::vector<Step> steps;
 };
 
-/// 1 cm to 1 m, for rooms.
+/// Returns distances from 1 cm to 1 m, for rooms.
 std::vector<double> defaultCloudDistances();
 
-/// @param distances_m above 0, in any order; the steps have the same order.
+/// Measures a map. @param distances_m above 0, in any order; the steps have the same order.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<double>& distances_m);
-/// The same with another truth for completeness: `to_find`, the part of the surfaces that the
+/// Measures a map with another truth for completeness: `to_find`, the part of the surfaces that the
 /// method can find.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<CloudPoint>& to_find,

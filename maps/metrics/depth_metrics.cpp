@@ -74,7 +74,7 @@ namespace {
 
 constexpr double kDeltaBase = 1.25;
 
-/// Fraction of the pairs that meet a condition.
+/// Returns the fraction of the pairs that meet a condition.
 template <typename Condition>
 double fractionWith(const std::vector<DepthPair>& pairs, Condition condition) {
   if (pairs.empty()) return 0;
@@ -103,7 +103,7 @@ double logarithmicError(const DepthPair& pair) {
   return std::log(pair.estimate_m) - std::log(pair.truth_m);
 }
 
-/// Fraction of the pairs with a disparity error over `limit_px` and over 5 %.
+/// Returns the fraction of the pairs with a disparity error over `limit_px` and over 5 %.
 double badPixels(const std::vector<DepthPair>& pairs, double focal_baseline, double limit_px) {
   return fractionWith(pairs, [&](const DepthPair& pair) {
     const double truth_px = focal_baseline / pair.truth_m;
@@ -128,7 +128,7 @@ DepthErrors depthErrors(const std::vector<DepthPair>& pairs, std::optional<doubl
     errors.bad_pix_3px = badPixels(pairs, *focal_baseline, 3);
   }
 
-  // Differences from the mean: no large squares cancel.
+  // With differences from the mean, no large squares cancel.
   const double mean_d = meanOf(pairs, logarithmicError);
   const double variance_d = meanOf(pairs, [mean_d](const DepthPair& pair) {
     return (logarithmicError(pair) - mean_d) * (logarithmicError(pair) - mean_d);
@@ -193,8 +193,8 @@ double fractionOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// The minimum error of the estimates within the tolerance around a pixel with a truth, metres;
-/// infinite without estimates.
+/// Returns the minimum error of the estimates within the tolerance around a pixel with a truth,
+/// metres; infinite without estimates.
 double minError(const ComparedDepths& depths, cv::Point pixel, int tolerance) {
   const double truth_m = depths.truth(pixel);
   double min_m = std::numeric_limits<double>::infinity();

@@ -21,11 +21,11 @@ struct DepthPair {
 };
 
 struct DepthPairingOptions {
-  /// The truth of a pixel is the one nearest in inverse depth within this number of columns and
-  /// rows. 1 tolerates silhouettes, where an edge pixel may fall on the far background. Range: 0 to
-  /// 100.
+  /// The truth of a pixel is the true depth nearest in inverse depth within this number of columns
+  /// and rows. 1 tolerates silhouettes, where an edge pixel may fall on the far background. Range:
+  /// 0 to 100.
   int tolerance_px = 0;
-  /// Farther truths are ignored. Above 0.
+  /// Farther truths (metres) are ignored. Above 0.
   double max_depth_m = std::numeric_limits<double>::infinity();
 
   template <typename Self, typename Visit>
@@ -36,7 +36,7 @@ struct DepthPairingOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// Whether a pixel of a depth map (metres) has a depth: finite and above 0.
+/// Returns whether a pixel of a depth map (metres) has a depth: finite and above 0.
 inline bool isDepth(float depth_m) { return std::isfinite(depth_m) && depth_m > 0; }
 
 /// A depth map and its truth, of the same size, metres.
@@ -53,11 +53,11 @@ struct ComparedDepths {
   void validate() const;
 };
 
-/// The truth that the estimate at a pixel is compared with, metres; 0 where there is none within
-/// the tolerance.
+/// Returns the truth for the estimate at a pixel, metres; 0 if there is no truth within the
+/// tolerance.
 double bestTruth(const ComparedDepths& depths, cv::Point pixel, const DepthPairingOptions& options);
 
-/// The pairs of all pixels where both maps have a depth, row by row.
+/// Returns the pairs of all pixels at which both maps have a depth, row by row.
 std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
                                   const DepthPairingOptions& options = {});
 
@@ -79,7 +79,7 @@ struct DepthErrors {
   double silog = 0;
   /// Mean |Z - Z_true| / Z_true (Ghosh and Gallego 2022, "AErrR"; Ye et al. 2019).
   double aerrr = 0;
-  /// The same divided by Z, as in the scripts of the paper.
+  /// Mean |Z - Z_true| / Z, as in the scripts of the paper.
   double aerrr_by_estimate = 0;
   double log_rmse = 0;  ///< 100 sqrt(mean d^2) (Eigen et al., NIPS 2014, "RMSE log").
   /// Fractions with max(Z/Z_true, Z_true/Z) under 1.25, 1.25^2 and 1.25^3 (Ladicky et al., CVPR
@@ -94,8 +94,8 @@ struct DepthErrors {
 DepthErrors depthErrors(const std::vector<DepthPair>& pairs,
                         std::optional<double> focal_baseline = std::nullopt);
 
-/// The mean of each field over the maps with points, with equal weights. `points` is their sum. A
-/// field that a map lacks is empty.
+/// Returns the mean of each field over the maps with points, with equal weights. `points` is their
+/// sum. A field that any map lacks is empty.
 DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps);
 
 /// Precision (the fraction of the estimates that are correct) and recall (the fraction of the truth
@@ -114,23 +114,23 @@ struct PrecisionRecall {
   /// Pixels with an estimate and no truth: in none of the other counts.
   std::uint64_t estimates_without_truth = 0;
 
-  /// Fraction of the estimates within the threshold of the truth; 0 without estimates.
+  /// Returns the fraction of the estimates within the threshold of the truth; 0 without estimates.
   double precision(std::size_t step) const;
-  /// Fraction of the truths with an estimate within the threshold; 0 without truths.
+  /// Returns the fraction of the truths with an estimate within the threshold; 0 without truths.
   double recall(std::size_t step) const;
-  /// The harmonic mean of the two; 0 where both are 0.
+  /// Returns the harmonic mean of precision and recall; 0 if both are 0.
   double f1(std::size_t step) const;
 
   /// Adds the counts of another map.
-  /// @throws std::invalid_argument where its thresholds differ.
+  /// @throws std::invalid_argument if its thresholds differ.
   void add(const PrecisionRecall& other);
 };
 
-/// 1 cm to 5 m, about even in the logarithm, for rooms and streets.
+/// Returns thresholds from 1 cm to 5 m, about even in the logarithm, for rooms and streets.
 std::vector<double> defaultDepthThresholds();
 
-/// Counts |Z - Z_true| <= threshold. An estimate is compared with its truth in `pairDepths`. A
-/// truth is compared with the estimate of the nearest depth within the tolerance.
+/// Counts pixels with |Z - Z_true| <= threshold. An estimate is compared with its truth as in
+/// `pairDepths`. A truth is compared with the estimate of the nearest depth within the tolerance.
 /// @param thresholds_m above 0, in any order; the steps have the same order.
 PrecisionRecall precisionRecall(const ComparedDepths& depths,
                                 const std::vector<double>& thresholds_m,

@@ -6,7 +6,7 @@
 
 namespace efm {
 
-/// All are 0 for an empty list.
+/// Statistics of a list; all are 0 for an empty list.
 struct SampleStatistics {
   std::uint64_t count = 0;
   double rms = 0;  ///< Root of the mean square.
@@ -19,11 +19,11 @@ struct SampleStatistics {
 
 SampleStatistics statisticsOf(const std::vector<double>& values);
 
-/// The middle value, or the mean of the two middle values; 0 for an empty list.
+/// Returns the middle value, or the mean of the two middle values; 0 for an empty list.
 double medianOf(std::vector<double> values);
 
-/// The quantile: the smallest value of the list with at least this fraction of the list at or below
-/// it; 0 for an empty list.
+/// Returns the quantile: the smallest value of the list with at least this fraction of the list at
+/// or below it; 0 for an empty list.
 /// @param fraction above 0, at most 1.
 double quantileOf(std::vector<double> values, double fraction);
 

@@ -19,7 +19,7 @@ namespace {
 
 bool earlier(const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; }
 
-/// @param poses sorted, at least one.
+/// Returns the pose that is nearest in time. @param poses sorted, at least one.
 const StampedPose& nearestInTime(const std::vector<StampedPose>& poses, const StampedPose& to) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), to, earlier);
   if (after == poses.begin()) return *after;
@@ -55,8 +55,7 @@ std::vector<PosePair> associatePoses(std::vector<StampedPose> estimate,
 
 namespace {
 
-/// Positions lie on a line where the ratio of their second to their first singular value is
-/// smaller.
+/// Positions lie on a line if the ratio of their second to their first singular value is smaller.
 constexpr double kMaxLineRatio = 1e-12;
 /// Maximum error of a spacing, as a fraction of it.
 constexpr double kMaxSpacingError = 0.2;
@@ -92,7 +91,7 @@ Rigid3 umeyama(const std::vector<PosePair>& pairs) {
           T_world_map.topRightCorner<3, 1>()};
 }
 
-/// The position of each pair along the trajectory, in the unit of the spacing. Never decreases.
+/// Returns the position of each pair along the trajectory, in the spacing's unit; never decreasing.
 std::vector<double> positionsAlong(const std::vector<PosePair>& pairs, RelativeSpacing::Unit unit) {
   std::vector<double> positions;
   positions.reserve(pairs.size());
@@ -112,7 +111,7 @@ std::vector<double> positionsAlong(const std::vector<PosePair>& pairs, RelativeS
   return positions;
 }
 
-/// The index, from `first` on, of the position nearest to `target`, off by less than `limit`.
+/// Returns the index, from `first` on, of the position nearest to `target`, within `limit`.
 std::optional<std::size_t> nearestIndex(const std::vector<double>& positions, std::size_t first,
                                         double target, double limit) {
   const auto begin = positions.begin() + static_cast<std::ptrdiff_t>(first);

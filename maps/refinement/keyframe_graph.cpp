@@ -36,7 +36,7 @@ void WindowGraph::addTracker(const TrackerErrors& errors) {
   }
 }
 
-/// The node of T_world_ref; creates both nodes of the keyframe where they are missing.
+/// Returns the node of T_world_ref. Creates both nodes of the keyframe if they are missing.
 std::size_t WindowGraph::refNode(std::size_t keyframe) {
   std::optional<std::size_t>& node = node_[keyframe];
   if (node) return *node;
@@ -53,7 +53,7 @@ std::size_t WindowGraph::refNode(std::size_t keyframe) {
 namespace {
 
 constexpr std::size_t kMaxNearestViews = 50;
-/// With up to 0.3 MB of points each.
+/// Maximum number of places, with up to 0.3 MB of points each.
 constexpr std::size_t kMaxPlaces = 1000;
 
 Eigen::Vector3d centreOfView(const RefinedKeyframe& keyframe) {
@@ -96,8 +96,8 @@ void KeyframeGraph::addPlace(std::size_t keyframe) {
   places.erase(redundant);
 }
 
-/// The index of the newer one of the two places that are nearest to each other, in position and in
-/// centre of view.
+/// Returns the index of the newer of the two places that are nearest to each other, in position and
+/// in centre of view.
 std::size_t KeyframeGraph::mostRedundant() const {
   using Position = Eigen::Matrix<double, 6, 1>;
   std::vector<Position> positions;
@@ -157,7 +157,7 @@ namespace {
 /// More loops hardly change the solution, and each costs as much as an anchor.
 constexpr std::size_t kMaxLoopsPerAnchor = 2;
 
-/// Takes small motions d in frame `a` to frame `b`: T_b_a * motion(d) = motion(M d) * T_b_a.
+/// Returns M with T_b_a * motion(d) = motion(M d) * T_b_a: it takes small motions to frame `b`.
 Matrix6d motionToFrame(const Rigid3& T_b_a) {
   const Eigen::Matrix3d R_b_a = T_b_a.rotation.toRotationMatrix();
   Matrix6d motion = Matrix6d::Zero();
@@ -176,7 +176,7 @@ class CondensedGraph {
     for (std::size_t i = begin_; i < graph.newest(); i += stride_) addAnchor(i);
     addAnchor(graph.newest());
     connectAnchors(graph.tracker.inGraph());
-    // The newest loops first.
+    // Adds the newest loops first.
     for (auto factor = graph.factors.rbegin(); factor != graph.factors.rend(); ++factor) {
       if (factor->robust) addLoop(*factor);
     }
@@ -233,7 +233,7 @@ class CondensedGraph {
     loops_.resize(anchors_.size());
   }
 
-  /// The anchor before a keyframe, or a fixed node for an earlier keyframe.
+  /// Returns the anchor before a keyframe; for a keyframe before all anchors, a fixed node.
   std::size_t nodeOf(std::size_t keyframe) {
     if (keyframe >= begin_) return (keyframe - begin_) / stride_;
     if (!fixed_[keyframe]) {

@@ -25,7 +25,7 @@ constexpr double kMaxTrustedError = 3;
 /// A loop with a larger error after solving is wrong.
 constexpr double kMaxError = 8;
 
-/// The loops with a larger error.
+/// Returns the loops with an error above `max_error`, in standard deviations.
 std::vector<RelativePoseFactor*> contradictedLoops(KeyframeGraph& graph, double max_error) {
   std::vector<RelativePoseFactor*> loops;
   for (RelativePoseFactor& factor : graph.factors) {
@@ -93,7 +93,7 @@ WindowGraph LoopCloser::solveAll(KeyframeGraph& graph) {
 }
 
 WindowGraph LoopCloser::solve(KeyframeGraph& graph, std::size_t first_free) {
-  // Loops count in full. Where they do not fit, drift is larger than short paths have shown.
+  // Loops count in full. If they do not fit, drift is larger than short paths have shown.
   PoseGraphOptions trusting = options_.graph;
   trusting.robust_sigmas = std::min(kTrustFactor * trusting.robust_sigmas, kMaxRobustSigmas);
   first_free = std::max<std::size_t>(first_free, 1);
@@ -189,8 +189,8 @@ void KeyframeRefiner::refineNewest() {
   if (const auto solved = loops_.solveWhenDue(graph_)) updateCovariance(*solved);
 }
 
-/// After an error: the newest keyframe keeps the tracker's motion, and others do not meet its
-/// points again. Factors of other keyframes stay.
+/// After an error, drops the points of the newest keyframe, which keeps the tracker's motion.
+/// Factors of other keyframes stay.
 void KeyframeRefiner::dropNewestPoints() {
   RefinedKeyframe& newest = graph_.keyframes.back();
   graph_.factors.resize(newest.first_factor);
@@ -201,7 +201,7 @@ void KeyframeRefiner::dropNewestPoints() {
   covariance_ += graph_.tracker.errors().driftCovariance(newest.path_length_m - last.path_length_m);
 }
 
-/// The pose by the motion of the tracker since the last keyframe.
+/// Predicts the pose by the motion of the tracker since the last keyframe.
 void KeyframeRefiner::predict(const RefinedKeyframe& last, RefinedKeyframe& keyframe) {
   const Rigid3 T_last_ref = last.T_odom_ref.inverse() * keyframe.T_odom_ref;
   keyframe.T_world_ref_denoised = last.T_world_ref_denoised * T_last_ref;
@@ -243,7 +243,7 @@ void KeyframeRefiner::registerNewest() {
 void KeyframeRefiner::updateCovariance(const WindowGraph& solved) {
   const RefinedKeyframe& newest = graph_.keyframes.back();
   const TrackerErrors& errors = graph_.tracker.errors();
-  // Where it cannot be computed: the drift of the whole path.
+  // If it cannot be computed, the drift of the whole path is used.
   covariance_ = solved.denoisedCovariance(options_.graph, graph_.newest())
                     .value_or(errors.driftCovariance(newest.path_length_m)) +
                 errors.noiseCovariance(newest.noise_scale);

@@ -20,13 +20,13 @@ namespace efm {
 
 struct RefinementOptions {
   TrackerErrors tracker;      ///< The expected errors of the incoming poses.
-  bool adapt_tracker = true;  ///< Learn these errors from the keyframes.
+  bool adapt_tracker = true;  ///< True: these errors are learnt from the keyframes.
   RegistrationCloudOptions points;
   KeyframeRegistrationOptions registration;
-  /// Number of last keyframes that are solved together. Earlier ones stay until a loop is closed.
+  /// Number of last keyframes that are solved together. Earlier keyframes stay until a loop closes.
   /// Range: 1 to 1000.
   int window = 10;
-  /// Number of these keyframes that a new one is registered with: those with the largest overlap.
+  /// Number of these keyframes that a new keyframe is registered with, by the largest overlap.
   /// Range: 1 to 100.
   int map_keyframes = 3;
   LoopOptions loop;
@@ -51,7 +51,7 @@ struct RefinementCounts {
   std::uint64_t loop_checks = 0;    ///< Candidates that were registered.
   std::uint64_t loops = 0;          ///< Candidates that became factors.
   std::uint64_t loops_dropped = 0;  ///< Loops that other factors contradicted.
-  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed: poses stayed.
+  std::uint64_t failed_solves = 0;  ///< Failed solves: the poses stayed.
 };
 
 /// Finds loops, verifies them, and solves the keyframes since the oldest new loop.
@@ -61,17 +61,17 @@ class LoopCloser {
 
   /// Checks the earlier keyframes with the largest overlap with the newest one.
   void search(KeyframeGraph& graph);
-  /// Registers the keyframes of a candidate with each other, and adds a factor where they agree.
-  /// @return whether they agree.
+  /// Registers the keyframes of a candidate with each other. Adds a factor if the results agree.
+  /// @return whether the results agree.
   bool check(KeyframeGraph& graph, const LoopCandidate& candidate);
-  /// Solves new loops where the path has grown enough since the last time.
-  /// @return the solved graph, or nothing.
+  /// Solves new loops if the path has grown enough since the last time.
+  /// @return the solved graph; std::nullopt if nothing was solved.
   std::optional<WindowGraph> solveWhenDue(KeyframeGraph& graph);
   /// Solves all keyframes.
-  /// @param graph at least two keyframes.
+  /// @param graph has at least two keyframes.
   WindowGraph solveAll(KeyframeGraph& graph);
 
-  /// The counts of loops; the others are 0.
+  /// The counts of loops; the other counts are 0.
   const RefinementCounts& counts() const { return counts_; }
 
  private:
@@ -80,7 +80,7 @@ class LoopCloser {
   RefinementOptions options_;
   RefinementCounts counts_;
   std::optional<std::size_t> oldest_unsolved_;  // the oldest keyframe of the new loops
-  std::size_t solved_at_ = 0;                   // the newest keyframe of that time
+  std::size_t solved_at_ = 0;                   // the newest keyframe at the last solve
 };
 
 /// Refines the poses of keyframes by their points, one keyframe after the other:
@@ -89,27 +89,27 @@ class LoopCloser {
 /// 3. The window of the last keyframes is solved (WindowGraph): the registrations, and the motions
 ///    of the tracker with their noise and drift.
 /// 4. A loop back to an earlier keyframe is verified by registration. Then all keyframes since that
-///    one are solved (LoopCloser).
+///    keyframe are solved (LoopCloser).
 /// The first keyframe keeps its pose by the tracker. Without a plausible registration the motion of
 /// the tracker is kept.
 ///
 /// Deterministic. Cost of a keyframe: registrations of a bounded number of points, one window, and
-/// loops in proportion to their length, spread over the keyframes. Memory: 48 bytes a point. Not
+/// loops in proportion to their length, spread over the keyframes. Memory: 48 bytes per point. Not
 /// thread-safe.
 class KeyframeRefiner {
  public:
   explicit KeyframeRefiner(const RefinementOptions& options);
 
-  /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
-  /// the stated noise is not finite or below 0.
+  /// Checks the input of `add`. @throws std::invalid_argument if the pose is not finite or beyond a
+  /// million kilometres, or the stated noise is not finite or below 0.
   static void requireUsable(const Rigid3& T_odom_ref, const std::optional<PoseNoise>& stated);
 
   /// Adds the next keyframe. Numbers count from 0.
   /// @param stated the noise of this pose as the tracker states it. It replaces the expected noise.
-  /// Where errors are learnt, it is corrected by the same factor.
-  /// @throws std::invalid_argument as `requireUsable`. The keyframe is not added then. After any
-  /// other error `keyframes` says whether it was added: then it has lost its points, and keeps the
-  /// tracker's motion. The next keyframe may be added in either case.
+  /// If errors are learnt, it is corrected by the same factor.
+  /// @throws std::invalid_argument as `requireUsable`. Then the keyframe is not added. After any
+  /// other error, `keyframes` shows whether it was added. If so, it has lost its points, and keeps
+  /// the tracker's motion. In both cases the next keyframe may be added.
   void add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
            const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that the caller proposes.
@@ -126,15 +126,15 @@ class KeyframeRefiner {
   /// Returns T_world_ref of the keyframes that were added or moved since the last call, by number.
   std::map<std::size_t, Rigid3> takeMoved();
 
-  /// Brings current poses of the tracker to the refined world; the identity without keyframes.
+  /// Returns the transform from tracker poses to the refined world; the identity without keyframes.
   Rigid3 T_world_odom() const;
-  /// The pose of the newest keyframe by the tracker, without noise; the identity without keyframes.
+  /// Returns the newest keyframe's tracker pose without noise; the identity without keyframes.
   Rigid3 T_world_ref_denoised() const {
     return graph_.keyframes.empty() ? Rigid3{} : graph_.keyframes.back().T_world_ref_denoised;
   }
-  /// The covariance of a corrected pose of the tracker at the newest keyframe, as in
+  /// Returns the covariance of a corrected pose of the tracker at the newest keyframe, as in
   /// `poseCovariance`, relative to the oldest fixed keyframes of the last window. With fewer than
-  /// two keyframes that of the noise.
+  /// two keyframes it is the covariance of the noise.
   const Matrix6d& covariance() const { return covariance_; }
   const TrackerErrors& trackerErrors() const { return graph_.tracker.errors(); }
   RefinementCounts counts() const;

@@ -21,12 +21,12 @@ constexpr int kCoarseIterations = 2;
 /// The points of a keyframe with their neighbours in the map.
 struct Neighbours {
   std::vector<PointPair> pairs;
-  std::vector<std::size_t> map_index;  ///< Of the keyframe of each pair.
+  std::vector<std::size_t> map_index;  ///< Index into the map of the keyframe of each pair.
   std::size_t visible = 0;
   std::size_t inliers = 0;
 };
 
-/// R * covariance * R^T.
+/// Returns R * covariance * R^T.
 Eigen::Matrix3d rotatedCovariance(const Eigen::Matrix3d& R, const Eigen::Matrix3f& covariance) {
   return R * covariance.cast<double>() * R.transpose();
 }
@@ -40,7 +40,7 @@ class NeighbourSearch {
     }
   }
 
-  /// @param stride uses each stride-th point only.
+  /// @param stride only each stride-th point is used.
   Neighbours find(const Rigid3& T_world_ref, double max_distance_px, std::size_t stride) const {
     Neighbours found;
     const Eigen::Matrix3d R_world_ref = T_world_ref.rotation.toRotationMatrix();
@@ -79,7 +79,7 @@ class NeighbourSearch {
   std::vector<Eigen::Matrix3d> R_world_from_;
 };
 
-/// The approximate uncertainty of a point in the image, by the prior.
+/// Returns the approximate uncertainty of a point in the image by the prior, pixels.
 double uncertaintyPx(const RegistrationCloud& cloud, const PosePrior& prior) {
   const Vector6d variances =
       inverseOf(prior.sqrt_information.transpose() * prior.sqrt_information).diagonal();
@@ -94,8 +94,8 @@ struct NormalEquations {
   Vector6d gradient = Vector6d::Zero();
 };
 
-/// The factor with the error |A d + b|^2, where A^T A is the information and A^T b the gradient.
-/// Directions that the pairs leave open have rows of zeros.
+/// Returns the factor with the error |A d + b|^2, where A^T A is the information and A^T b the
+/// gradient. Unobservable directions have rows of zeros.
 RelativePoseFactor factorOf(const NormalEquations& equations, const Rigid3& T_from_to) {
   constexpr double kMinRatio = 1e-9;
   RelativePoseFactor factor;

@@ -14,11 +14,11 @@ namespace efm {
 
 struct KeyframeRegistrationOptions {
   /// The maximum distance between a point and its neighbour in the view of the neighbour, pixels.
-  /// The first rounds use the uncertainty of the prior, limited by the first number. The last
-  /// rounds use the last number. Range: above 0, the first at least the last.
+  /// The first rounds use the uncertainty of the prior, limited by `first_distance_px`. The last
+  /// rounds use `last_distance_px`. Range: above 0, the first at least the last.
   double first_distance_px = 16;
   double last_distance_px = 2;
-  /// Converged to a thousandth only, because the neighbours change afterwards.
+  /// A gain below a thousandth ends a solve, because the neighbours change afterwards.
   AlignmentOptions alignment{3, 10, 1e-3};
 
   template <typename Self, typename Visit>
@@ -41,18 +41,18 @@ struct MapKeyframe {
 /// The pose of a keyframe by its points.
 struct Registration {
   Rigid3 T_world_ref;
-  /// The pairs with each keyframe of the map as a factor, linearised at that pose. One per keyframe
-  /// of the map that shares points.
+  /// One factor per keyframe of the map that shares points: the pairs with this keyframe,
+  /// linearised at the pose.
   std::vector<RelativePoseFactor> factors;
   std::size_t visible = 0;  ///< Points in the view of a keyframe of the map.
   std::size_t inliers = 0;  ///< Points with a neighbour in the last round.
-  /// Of the pairs, in standard deviations. 0 without pairs.
+  /// Median error of the pairs, in standard deviations. 0 without pairs.
   double median_error = 0;
   /// The distance of the pose from the prior, in standard deviations of the prior.
   double from_prior = 0;
-  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed.
+  std::uint64_t failed_solves = 0;  ///< Failed solves: the pose stayed.
 
-  /// Fraction of the visible points that are inliers.
+  /// Returns the fraction of the visible points that are inliers.
   double inlierRatio() const {
     return visible > 0 ? static_cast<double>(inliers) / static_cast<double>(visible) : 0;
   }
@@ -66,8 +66,8 @@ struct Registration {
 /// move, and each factor connects two keyframes. Deterministic. With the default distances: six
 /// rounds with 300 points, two with all points.
 /// @param number of the keyframe, for the factors.
-/// @param prior in the world, not singular. It determines the directions that the map leaves open.
-/// @return without inliers and factors where the last minimum cannot be computed.
+/// @param prior in the world, not singular. It determines unobservable directions.
+/// @return a registration without inliers and factors if the last solve fails.
 Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,
                               const std::vector<MapKeyframe>& map, const PosePrior& prior,
                               const KeyframeRegistrationOptions& options);

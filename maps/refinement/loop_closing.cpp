@@ -12,10 +12,10 @@ namespace {
 constexpr std::size_t kOverlapStride = 10;
 /// Fewer pairs may match by chance.
 constexpr std::size_t kMinLoopPairs = 100;
-/// In standard deviations. Pairs of the same place differ by their noise; pairs of different places
-/// by up to the maximum distance of neighbours.
+/// Maximum, in standard deviations. Pairs of a place differ by their noise; pairs of different
+/// places by up to the maximum distance of neighbours.
 constexpr double kMaxMedianError = 1.0;
-/// In standard deviations from the candidate: 1 of 10^5 correct loops is farther.
+/// Maximum distance from the candidate, in standard deviations: 1 of 10^5 correct loops is farther.
 constexpr double kMaxLoopPriorSigmas = 5.5;
 /// Factor of the first distance of neighbours, because drift adds up along a loop.
 constexpr double kFirstDistanceFactor = 3;
@@ -23,14 +23,14 @@ constexpr double kFirstDistanceFactor = 3;
 /// and edges that depend on the viewpoint.
 constexpr double kSystematicM = 0.005;
 constexpr double kSystematicRad = 0.1 * kRadiansPerDegree;
-/// Of directions that a registration leaves open: far above each limit.
+/// Variance of unobservable directions of a registration: far above each limit.
 constexpr double kOpenVariance = 1e6;
 /// Maximum difference between the two registrations, as a multiple of the maximum sigmas.
 constexpr double kBothWaysSigmas = 1.5;
 
 double maxSigma(const Eigen::Matrix3d& covariance) { return std::sqrt(maxEigenvalue(covariance)); }
 
-/// The factor with the systematic errors added to its covariance.
+/// Returns the factor with the systematic errors added to its covariance.
 RelativePoseFactor withSystematicError(RelativePoseFactor factor) {
   MotionEstimate motion = motionOf(factor, kOpenVariance);
   motion.covariance.diagonal().head<3>().array() += kSystematicM * kSystematicM;

@@ -13,7 +13,7 @@
 namespace efm {
 
 struct LoopOptions {
-  bool loops = true;  ///< Whether loops are searched.
+  bool loops = true;  ///< True if loops are searched.
   /// Minimum fraction of the points of a keyframe in the view of a candidate. Range: above 0, at
   /// most 1.
   double loop_min_overlap = 0.3;
@@ -22,7 +22,7 @@ struct LoopOptions {
   /// Maximum standard deviations of the registration in its least certain direction. Above 0.
   double loop_max_sigma_m = 0.03;
   double loop_max_sigma_rad = 0.5 * kRadiansPerDegree;
-  int loop_checks = 1;  ///< Candidates that are registered per keyframe, 0 to 100.
+  int loop_checks = 1;  ///< Number of candidates that are registered per keyframe, 0 to 100.
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -44,20 +44,21 @@ struct LoopCandidate {
   Rigid3 T_older_newer;  ///< The approximate relative pose.
 };
 
-/// What the registrations of a candidate say.
+/// The result of the registrations of a candidate.
 struct LoopCheck {
   std::optional<RelativePoseFactor> factor;
   std::uint64_t failed_solves = 0;  ///< As in Registration.
 };
 
-/// The fraction of the points of one keyframe that lie in the view of another one.
+/// Returns the fraction of the points of a keyframe that lie in the view of another keyframe.
 double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in, const Rigid3& T_in_of);
 
 /// Registers the keyframes of a candidate with each other, in both directions. A wrong place may
 /// look right in one direction only.
 /// @param covariance of T_older_newer.
-/// @return a robust factor; none where a registration has too few pairs, too large errors, too
-/// large standard deviations or too large a distance from T_older_newer, or where the two disagree.
+/// @return a robust factor; no factor if a registration has too few pairs, too large errors, too
+/// large standard deviations or too large a distance from T_older_newer, or if the two results
+/// disagree.
 LoopCheck verifyLoop(const LoopCandidate& candidate, const RegistrationCloud& older,
                      const RegistrationCloud& newer, const Matrix6d& covariance,
                      const LoopOptions& options, const KeyframeRegistrationOptions& registration);

@@ -24,8 +24,8 @@
 namespace efm {
 namespace {
 
-/// The Cholesky factor of a 3 x 3 matrix. Its diagonal has a value that is not above 0, or none,
-/// where the matrix is not positive definite.
+/// Returns the Cholesky factor of a 3 x 3 matrix. If the matrix is not positive definite, a value
+/// on its diagonal is not above 0 or not a number.
 Eigen::Matrix3d factorOf(const Eigen::Matrix3d& a) {
   Eigen::Matrix3d l = Eigen::Matrix3d::Zero();
   l(0, 0) = std::sqrt(a(0, 0));
@@ -150,7 +150,7 @@ Vector3<T> rotationVectorOf(const Eigen::Quaternion<T>& rotation) {
   return rotation_vector;
 }
 
-/// differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to).
+/// Returns differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to).
 template <typename T>
 Vector6<T> differenceBetween(const Rigid3& T_from_to, const Pose<T>& from, const Pose<T>& to) {
   const Eigen::Quaternion<T> R_from_world = from.rotation.conjugate();

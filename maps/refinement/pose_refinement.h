@@ -18,11 +18,11 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 // Decompositions of small symmetric matrices. They are compiled once, in pose_refinement.cpp,
 // because each takes the compiler seconds.
 
-/// The lower triangular L with covariance = L L^T.
+/// Returns the lower triangular L with covariance = L L^T.
 /// @param covariance positive definite.
 Matrix6d choleskyFactor(const Matrix6d& covariance);
 
-/// L^-1, where covariance = L L^T: it scales errors with this covariance to unit covariance.
+/// Returns L^-1 for covariance = L L^T: it scales errors with this covariance to unit covariance.
 /// @param covariance positive definite.
 Matrix6d sqrtInformation(const Matrix6d& covariance);
 Eigen::Matrix3d sqrtInformation(const Eigen::Matrix3d& covariance);
@@ -32,7 +32,7 @@ bool isPositiveDefinite(const Eigen::Matrix3d& matrix);
 /// @param matrix not singular.
 Matrix6d inverseOf(const Matrix6d& matrix);
 
-/// [v]x: crossMatrix(v) * w = v x w.
+/// Returns the matrix M with M * w = v x w.
 Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
 
 /// matrix = vectors * diag(values) * vectors^T; values ascending.
@@ -44,11 +44,11 @@ EigenDecomposition eigenDecomposition(const Matrix6d& matrix);
 
 double maxEigenvalue(const Eigen::Matrix3d& matrix);
 
-/// The motion T_a_b as six numbers: the translation in metres, then the rotation vector (axis times
-/// angle, at most pi) in radians. Covariances and informations of poses have the same order.
+/// Returns the motion T_a_b as six numbers: the translation in metres, then the rotation vector
+/// (axis times angle, at most pi) in radians. Covariances and informations have the same order.
 Vector6d differenceOf(const Rigid3& T_a_b);
 
-/// The inverse of `differenceOf`.
+/// Inverts `differenceOf`.
 Rigid3 rigidFromDifference(const Vector6d& difference);
 
 // The refinement of poses, with Ceres. Poses change on the manifold of rotations and translations,
@@ -74,8 +74,7 @@ struct AlignmentOptions {
   /// above 0, at most 1000.
   double robust_sigmas = 3;
   int max_iterations = 10;  ///< 1 to 1000.
-  /// The last iteration reduces the sum of squared errors by less than this fraction. Range: 0
-  /// to 1.
+  /// A solve ends when the sum of squared errors falls by less than this fraction. Range: 0 to 1.
   double min_gain = 1e-8;
 
   template <typename Self, typename Visit>
@@ -87,10 +86,10 @@ struct AlignmentOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// The pose that aligns the points of a keyframe with those of the map: the minimum of the sum of
-/// squared errors of all pairs and the prior near the start (Levenberg-Marquardt). The prior
-/// determines the directions that the pairs leave open.
-/// @return nothing where the minimum cannot be computed.
+/// Finds the pose that aligns the points of a keyframe with those of the map: the minimum of the
+/// sum of squared errors of all pairs and the prior near the start (Levenberg-Marquardt). The prior
+/// determines unobservable directions.
+/// @return std::nullopt if the solve fails.
 std::optional<Rigid3> alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
                                  const Rigid3& T_map_start, const AlignmentOptions& options);
 
@@ -102,11 +101,11 @@ struct RelativePoseFactor {
   Rigid3 T_from_to;
   Matrix6d sqrt_information = Matrix6d::Identity();
   Vector6d offset = Vector6d::Zero();
-  /// Whether the measurement may be an outlier. Then large errors have less weight (Cauchy's loss).
+  /// True if the measurement may be an outlier. Then large errors have less weight (Cauchy's loss).
   bool robust = false;
 };
 
-/// The norm of the error of a factor, in standard deviations.
+/// Returns the norm of the error of a factor, in standard deviations.
 double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
                const Rigid3& T_world_to);
 
@@ -116,9 +115,8 @@ struct MotionEstimate {
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-/// The minimum of the error of a factor.
-/// @param open_variance variance of the directions that the factor leaves open, m^2 and rad^2,
-/// above 0.
+/// Returns the motion with the minimum error of a factor.
+/// @param open_variance variance of unobservable directions, m^2 and rad^2, above 0.
 MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance);
 
 /// Poses, and the factors between them.
@@ -143,12 +141,12 @@ struct PoseGraphOptions {
 };
 
 /// Moves the poses that are not fixed to the minimum of the sum of squared errors.
-/// @return false where the minimum cannot be computed. The poses stay then.
+/// @return false if the solve fails. Then the poses stay.
 bool solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph);
 
-/// The covariance of a pose that is not fixed, given the fixed poses: of its translation along the
-/// axes of the world in metres, then of a rotation vector about them in radians.
-/// @return nothing where the pose is fixed, or the factors leave it open.
+/// Returns the covariance of a pose that is not fixed, given the fixed poses: of its translation
+/// along the axes of the world in metres, then of a rotation vector about these axes in radians.
+/// @return std::nullopt if the pose is fixed or unobservable.
 std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,
                                        std::size_t node);
 

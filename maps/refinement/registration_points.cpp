@@ -18,7 +18,7 @@ namespace {
 
 /// Maximum difference between the inverse depths of an edge, in standard deviations.
 constexpr double kSameEdgeSigmas = 3;
-/// A neighbourhood is an edge where the ratio of its variances along and across is larger.
+/// A neighbourhood is an edge if the ratio of its variances along and across is larger.
 constexpr double kEdgeElongation = 4;
 /// Standard deviation of a point along its edge, pixels: it is not measured.
 constexpr double kAlongEdgePx = 100;
@@ -34,7 +34,7 @@ struct CertainPixel {
   float relative_sigma = 0;  // of depth
 };
 
-/// Whether a pixel has a depth with a known variance.
+/// Returns whether a pixel has a depth with a known variance.
 bool isMeasured(float depth, float variance) {
   return depth > 0 && std::isfinite(depth) && variance >= 0 && std::isfinite(variance);
 }
@@ -53,7 +53,7 @@ std::vector<CertainPixel> certainPixels(const DepthMap& map) {
   return pixels;
 }
 
-/// The most certain pixel of each cell of a grid, then the second ones, up to `count` pixels.
+/// Returns the most certain pixel of each cell of a grid, then the second ones, up to `count`.
 std::vector<CertainPixel> spreadOver(const std::vector<CertainPixel>& pixels, cv::Size size,
                                      int count) {
   // One cell for four points, because most cells of a semi-dense map are empty.
@@ -119,7 +119,7 @@ Neighbourhood neighbourhoodOf(const KeyframeDepthMap& keyframe, const CertainPix
   return {covariance.topLeftCorner<3, 3>(), covariance.bottomRightCorner<2, 2>()};
 }
 
-/// The variance along an edge: the position along it is not measured.
+/// Returns the covariance along an edge: the position along the edge is not measured.
 Eigen::Matrix3d alongEdge(const Neighbourhood& around, const ReferenceView& view, double depth) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
   eigen.computeDirect(around.in_image);
@@ -145,7 +145,7 @@ RegistrationPoint pointOf(const KeyframeDepthMap& keyframe, const CertainPixel& 
   return {p_ref.cast<float>(), covariance.cast<float>()};
 }
 
-/// False where a depth is so large or small that floats do not hold its square.
+/// Returns false if a depth is so large or small that floats do not hold its square.
 bool isUsable(const RegistrationPoint& point) {
   return point.p_ref.allFinite() && point.covariance.allFinite() &&
          isPositiveDefinite(point.covariance.cast<double>());

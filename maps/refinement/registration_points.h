@@ -15,11 +15,11 @@
 namespace efm {
 
 struct RegistrationCloudOptions {
-  /// Maximum number of points that are registered with other keyframes: the most certain ones,
+  /// Maximum number of points that are registered with other keyframes: the most certain points,
   /// spread over the image. Range: 10 to 100,000.
   int max_points = 2000;
   /// Maximum number of points that other keyframes are registered with, selected in the same way.
-  /// More points, because a missing neighbour causes a wrong pair. Range: `max_points` to
+  /// There are more, because a missing neighbour causes a wrong pair. Range: `max_points` to
   /// 1,000,000.
   int max_map_points = 6000;
   /// Standard deviation of the position of an edge in the image, pixels. Range: above 0, at most
@@ -45,21 +45,21 @@ struct RegistrationCloudOptions {
   void validate() const;
 };
 
-/// A point of a keyframe as a normal distribution. Its covariance is that of the points around it,
-/// which lie along an edge or on a surface, plus that of its own measurement. So an edge determines
-/// two directions, and a surface one.
+/// A point of a keyframe as a normal distribution. Its covariance is the covariance of the points
+/// around it, which lie along an edge or on a surface, plus that of its own measurement. So an edge
+/// determines two directions, and a surface one.
 struct RegistrationPoint {
   Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();           ///< Metres, frame `ref`.
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Identity();  ///< m^2, frame `ref`.
 };
 
-/// The points of a keyframe for registrations. 48 bytes a point, and as much for the search tree.
+/// The points of a keyframe for registrations. 48 bytes per point, and as much for the search tree.
 class RegistrationCloud {
  public:
   /// Selects the most certain points of each cell of the image, and computes their covariances.
   RegistrationCloud(const KeyframeDepthMap& keyframe, const RegistrationCloudOptions& options);
 
-  /// The most certain ones first. Other keyframes are registered with all points. The first
+  /// The most certain points first. Other keyframes are registered with all of them. Only the first
   /// `numQueryPoints` are registered with other keyframes.
   const std::vector<RegistrationPoint>& points() const { return points_; }
   std::size_t numQueryPoints() const { return num_query_points_; }
@@ -67,12 +67,12 @@ class RegistrationCloud {
   double focalPx() const { return view_.fx; }
   double middleInverseDepth() const { return 0.5 * (max_inverse_depth_ + min_inverse_depth_); }
 
-  /// Whether a point lies in the view, and in its range of depths (with a margin).
+  /// Returns whether a point lies in the view, and in its range of depths (with a margin).
   bool isInView(const Eigen::Vector3d& p_ref) const;
-  /// The index of the nearest point in the view: by column, row, and inverse depth in units of its
-  /// median standard deviation. In these coordinates errors are equal in all directions and at all
-  /// depths; in space they are not.
-  /// @return nothing where no point is within the distance.
+  /// Returns the index of the nearest point in the view: by column, row, and inverse depth in units
+  /// of its median standard deviation. In these coordinates errors are equal in all directions and
+  /// at all depths; in space they are not.
+  /// @return std::nullopt if no point is within the distance.
   std::optional<std::size_t> nearest(const Eigen::Vector3d& p_ref, double max_distance_px) const;
 
   /// Drops all points: nothing is in view, and nothing is found.

@@ -68,7 +68,7 @@ Matrix6d TrackerErrors::noiseCovariance(const NoiseScale& scale) const {
 }
 
 Matrix6d TrackerErrors::driftCovariance(double path_length_m) const {
-  // A random walk on short paths. On long paths a constant drift is larger.
+  // Drift is a random walk on short paths. On long paths a constant drift is larger.
   const double squared_length = path_length_m * std::max(path_length_m, 1.0);
   return covarianceOf(drift_m * drift_m * squared_length, drift_rad * drift_rad * squared_length);
 }
@@ -110,7 +110,7 @@ TrackerErrors estimateTrackerErrors(const std::vector<MotionSample>& samples,
 namespace {
 
 constexpr double kCautiousFraction = 0.25;
-/// From about 25 keyframes.
+/// Maximum number of samples, from about 25 keyframes.
 constexpr std::size_t kMaxSamples = 100;
 constexpr double kDriftStep = 3;
 constexpr double kMaxDriftFactor = 9;

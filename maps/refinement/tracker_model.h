@@ -13,8 +13,8 @@
 
 namespace efm {
 
-/// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 where
-/// the tracker states nothing.
+/// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 if the
+/// tracker states nothing.
 struct NoiseScale {
   double translation = 1;
   double rotation = 1;
@@ -39,59 +39,59 @@ struct TrackerErrors {
     visit("tracker_drift_deg_per_m", self.drift_rad, range.in(kRadiansPerDegree));
   }
   void validate() const { requireFields(*this); }
-  /// The covariance of a pose relative to the pose without noise. Never singular.
+  /// Returns the covariance of a pose relative to the pose without noise. Never singular.
   Matrix6d noiseCovariance(const NoiseScale& scale = {}) const;
-  /// The covariance of the motion without noise along a path. Never singular.
+  /// Returns the covariance of the motion without noise along a path. Never singular.
   Matrix6d driftCovariance(double path_length_m) const;
 };
 
 /// A motion between two keyframes by the tracker, compared with the motion by their points.
 struct MotionSample {
   Vector6d difference = Vector6d::Zero();
-  Matrix6d covariance = Matrix6d::Identity();  ///< Of the motion by points. Not singular.
-  double path_length_m = 0;                    ///< Between the two.
+  Matrix6d covariance = Matrix6d::Identity();  ///< Covariance of the latter motion; not singular.
+  double path_length_m = 0;                    ///< Path length between the two keyframes.
   NoiseScale from = {};
   NoiseScale to = {};
 };
 
-/// The most likely errors, given the samples and the expected errors. Their prior is lognormal: one
-/// standard deviation is a factor of ten for noise, and of two for drift. The prior of drift is
-/// tighter because few samples do not show drift, and a drift of 0 would bend every loop. Few
-/// samples change little. Cost: a few hundred 6 x 6 decompositions per sample.
+/// Returns the most likely errors, given the samples and the expected errors. Their prior is
+/// lognormal: one standard deviation is a factor of ten for noise, and of two for drift. The prior
+/// of drift is tighter because few samples do not show drift, and a drift of 0 would bend every
+/// loop. Few samples change little. Cost: a few hundred 6 x 6 decompositions per sample.
 TrackerErrors estimateTrackerErrors(const std::vector<MotionSample>& samples,
                                     const TrackerErrors& expected);
 
 /// A keyframe with a refined pose.
 struct RefinedKeyframe {
   RegistrationCloud cloud;
-  Rigid3 T_odom_ref;             ///< By the tracker; its world may drift.
-  Rigid3 T_world_ref;            ///< Refined.
+  Rigid3 T_odom_ref;             ///< Pose by the tracker, whose world may drift.
+  Rigid3 T_world_ref;            ///< Refined pose.
   Rigid3 T_world_ref_denoised;   ///< The pose of the tracker without noise, in the refined world.
   double path_length_m = 0;      ///< From the first keyframe, by the tracker.
-  NoiseScale noise_scale = {};   ///< Of its pose by the tracker.
+  NoiseScale noise_scale = {};   ///< Noise of its pose by the tracker.
   std::size_t first_factor = 0;  ///< No factor before this index has the keyframe.
-  bool moved = true;             ///< Since `takeMoved`.
+  bool moved = true;             ///< True if it moved since `takeMoved`.
 };
 
 /// The errors of the tracker, learnt from the registrations of its keyframes.
 class TrackerModel {
  public:
-  /// @param adapt whether the errors are learnt; otherwise they are the expected ones.
+  /// @param adapt whether the errors are learnt; otherwise they are the expected errors.
   TrackerModel(const TrackerErrors& expected, bool adapt)
       : expected_(expected), errors_(expected), adapt_(adapt) {}
 
   /// The estimated errors.
   const TrackerErrors& errors() const { return errors_; }
-  /// For registrations: at least a fraction of the expected errors, because a tracker that was
-  /// exact may become worse.
+  /// Returns the errors for registrations: at least a fraction of the expected errors, because a
+  /// tracker that was exact may become worse.
   TrackerErrors cautious() const;
-  /// For pose graphs: with the drift that loops have shown.
+  /// Returns the errors for pose graphs: with the drift that loops have shown.
   TrackerErrors inGraph() const;
 
-  /// The scale of a noise that the tracker states for one pose.
+  /// Returns the scale of a noise that the tracker states for one pose.
   NoiseScale scaleOf(const std::optional<PoseNoise>& stated) const;
 
-  /// Adds the difference between the motion of the tracker and that of a registration.
+  /// Adds the difference between the motions of the tracker and of a registration.
   /// @param from, to the keyframes of the factor.
   void addSample(const RelativePoseFactor& factor, const RefinedKeyframe& from,
                  const RefinedKeyframe& to);
