@@ -262,7 +262,7 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink
   return sweepSpace(std::move(rays), {view_, planes_}, options_.sweep, request);
 }
 
-/// 5. Depth and confidence from the fused DSI.
+/// 5. Finds depth and confidence in the fused DSI.
 void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                              KeyframeDepthMap& keyframe) const {
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;

@@ -22,7 +22,7 @@ enum class KeyframePolicyKind {
 /// The time of the reference view within its window.
 enum class ReferenceTime {
   kMiddle,
-  kEnd,  ///< For forward-looking vehicles.
+  kEnd,  ///< The end of the window, for forward-looking vehicles.
 };
 
 std::string_view nameOf(KeyframePolicyKind policy);

@@ -53,7 +53,7 @@ struct OptionChoice {
 /// Sets automatic options to values that fit the other options, until the values are chosen.
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
-/// Returns the number of planes: 100; up to 400 if these would be more than a pixel of parallax
+/// Returns the number of planes: 100; up to 400 if planes would be more than a pixel of parallax
 /// apart; down to 25 if they would be less than a tenth of a pixel (unobservable) apart.
 int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m);
 

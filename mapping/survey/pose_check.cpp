@@ -167,7 +167,7 @@ class PoseCheck {
     candidates_.push_back(inverted);
   }
 
-  /// Returns the gains of a time shift over those of the first `count` pieces that have all poses.
+  /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
   Gains gainsOfShift(double shift_s, std::size_t count) {
     Gains gains;
     const std::int64_t shift_ns = durationFromSeconds(shift_s);

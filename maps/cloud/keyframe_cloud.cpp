@@ -104,7 +104,7 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
   settle();
 }
 
-/// If there are enough voxels, finalizes the keyframes that cannot change any more: neither they
+/// Finalizes the keyframes that cannot change any more, if there are enough voxels: neither they
 /// nor the keyframes that check them may move from now on.
 void RefinedCloud::settle() {
   constexpr std::size_t kMinVoxels = 200'000;  // about 15 MB

@@ -29,7 +29,7 @@ class WindowGraph {
   bool solve(const PoseGraphOptions& options) { return solvePoseGraph(options, graph_); }
 
   bool has(std::size_t keyframe) const { return node_[keyframe].has_value(); }
-  /// The poses of a keyframe in the graph.
+  /// Returns the poses of a keyframe in the graph.
   const Rigid3& T_world_ref(std::size_t keyframe) const {
     return graph_.T_world_node[node_[keyframe].value()];
   }

@@ -189,8 +189,8 @@ void KeyframeRefiner::refineNewest() {
   if (const auto solved = loops_.solveWhenDue(graph_)) updateCovariance(*solved);
 }
 
-/// After an error, drops the points of the newest keyframe, which keeps the tracker's motion.
-/// Factors of other keyframes stay.
+/// Drops the points of the newest keyframe after an error: it keeps the tracker's motion. Factors
+/// of other keyframes stay.
 void KeyframeRefiner::dropNewestPoints() {
   RefinedKeyframe& newest = graph_.keyframes.back();
   graph_.factors.resize(newest.first_factor);

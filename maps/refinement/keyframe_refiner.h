@@ -26,7 +26,7 @@ struct RefinementOptions {
   /// Number of last keyframes that are solved together. Earlier keyframes stay until a loop closes.
   /// Range: 1 to 1000.
   int window = 10;
-  /// Number of these keyframes that a new keyframe is registered with, by the largest overlap.
+  /// Number of keyframes of the window that a new keyframe is registered with, by largest overlap.
   /// Range: 1 to 100.
   int map_keyframes = 3;
   LoopOptions loop;
@@ -119,7 +119,7 @@ class KeyframeRefiner {
   void finish();
 
   std::size_t keyframes() const { return graph_.keyframes.size(); }
-  /// The refined pose.
+  /// Returns the refined pose.
   const Rigid3& T_world_ref(std::size_t number) const {
     return graph_.keyframes.at(number).T_world_ref;
   }

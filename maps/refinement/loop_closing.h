@@ -17,7 +17,7 @@ struct LoopOptions {
   /// Minimum fraction of the points of a keyframe in the view of a candidate. Range: above 0, at
   /// most 1.
   double loop_min_overlap = 0.3;
-  /// Minimum fraction of these points with a neighbour. Range: 0 to 1.
+  /// Minimum fraction of the points in view that have a neighbour. Range: 0 to 1.
   double loop_min_inliers = 0.5;
   /// Maximum standard deviations of the registration in its least certain direction. Above 0.
   double loop_max_sigma_m = 0.03;
@@ -47,7 +47,7 @@ struct LoopCandidate {
 /// The result of the registrations of a candidate.
 struct LoopCheck {
   std::optional<RelativePoseFactor> factor;
-  std::uint64_t failed_solves = 0;  ///< As in Registration.
+  std::uint64_t failed_solves = 0;  ///< Failed solves, as in Registration.
 };
 
 /// Returns the fraction of the points of a keyframe that lie in the view of another keyframe.

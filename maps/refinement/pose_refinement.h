@@ -127,7 +127,7 @@ struct PoseGraph {
 };
 
 struct PoseGraphOptions {
-  double robust_sigmas = 3;  ///< For robust factors, as in AlignmentOptions.
+  double robust_sigmas = 3;  ///< Limit of robust factors, as in AlignmentOptions.
   int max_iterations = 20;   ///< 1 to 1000.
 
   template <typename Self, typename Visit>

@@ -67,7 +67,7 @@ struct RefinedKeyframe {
   Rigid3 T_odom_ref;             ///< Pose by the tracker, whose world may drift.
   Rigid3 T_world_ref;            ///< Refined pose.
   Rigid3 T_world_ref_denoised;   ///< The pose of the tracker without noise, in the refined world.
-  double path_length_m = 0;      ///< From the first keyframe, by the tracker.
+  double path_length_m = 0;      ///< Path from the first keyframe, by the tracker.
   NoiseScale noise_scale = {};   ///< Noise of its pose by the tracker.
   std::size_t first_factor = 0;  ///< No factor before this index has the keyframe.
   bool moved = true;             ///< True if it moved since `takeMoved`.
