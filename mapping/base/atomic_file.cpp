@@ -24,20 +24,20 @@ std::runtime_error cannotWrite(const std::filesystem::path& path, const std::str
 /// The path itself, or the file at the end of its symbolic links.
 std::filesystem::path replaceableFile(const std::filesystem::path& path) {
   constexpr int kMaxLinks = 40;  // as Linux has it
-  const auto refuse = [&](const std::string& why) { return cannotWrite(path, why); };
-  if (path.empty()) throw refuse("expected the name of a file");
+  const auto reject = [&](const std::string& why) { return cannotWrite(path, why); };
+  if (path.empty()) throw reject("expected the name of a file");
   std::error_code error;
   std::filesystem::path file = path;
   for (int links = 0; std::filesystem::is_symlink(file, error); ++links) {
-    if (links == kMaxLinks) throw refuse("too many symbolic links");
+    if (links == kMaxLinks) throw reject("too many symbolic links");
     file = file.parent_path() / std::filesystem::read_symlink(file, error);
-    if (error) throw refuse(error.message());
+    if (error) throw reject(error.message());
   }
   const std::filesystem::file_status status = std::filesystem::status(file, error);
-  if (error == std::errc::filename_too_long) throw refuse(error.message());
-  if (std::filesystem::is_directory(status) || !file.has_filename()) throw refuse("it is a folder");
+  if (error == std::errc::filename_too_long) throw reject(error.message());
+  if (std::filesystem::is_directory(status) || !file.has_filename()) throw reject("it is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw refuse("it is there and not a regular file");
+    throw reject("it is there and not a regular file");
   }
   return file;
 }

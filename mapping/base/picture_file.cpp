@@ -26,7 +26,7 @@ namespace {
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 26U;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30U;
 
-/// Refuses what only a damaged header says, before memory is taken for it. No usual compression
+/// Rejects what only a damaged header says, before memory is taken for it. No usual compression
 /// makes a file more than 4096 times smaller.
 void requireBelievable(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_per_row,
                        std::size_t file_size) {

@@ -9,7 +9,7 @@
 
 namespace efm {
 
-void refuse(const Event& event, int camera, const std::string& expected) {
+void reject(const Event& event, int camera, const std::string& expected) {
   throw std::invalid_argument("camera " + std::to_string(camera) + ", event at " +
                               formatSeconds(event.t_ns) + " s: " + expected);
 }
@@ -19,7 +19,7 @@ void requireInsideSensor(EventSpan events, int camera, const CameraModel& model)
     return event.x >= model.width || event.y >= model.height;
   });
   if (outside == events.end()) return;
-  refuse(*outside, camera,
+  reject(*outside, camera,
          "pixel (" + std::to_string(outside->x) + ", " + std::to_string(outside->y) +
              ") must lie inside the sensor of " + std::to_string(model.width) + "x" +
              std::to_string(model.height));

@@ -56,7 +56,7 @@ inline constexpr std::int64_t kFarAheadNs = 1'000'000'000;
 inline constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
 
 /// @throws std::invalid_argument "camera 0, event at 1.000000000 s: expected".
-[[noreturn]] void refuse(const Event& event, int camera, const std::string& expected);
+[[noreturn]] void reject(const Event& event, int camera, const std::string& expected);
 
 /// @throws std::invalid_argument naming the first event that lies outside the sensor.
 void requireInsideSensor(EventSpan events, int camera, const CameraModel& model);

@@ -37,11 +37,11 @@ enum class EventFate {
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
   kOverBudget,     ///< In a window that was mapped, but not among the events chosen there.
   // Of the queue, in live operation, before the mapping.
-  kThinned,    ///< Left out by the budget in sensor time.
-  kQueueFull,  ///< Dropped because the queue was full.
-  kRefused,    ///< In a packet that contradicts its camera, or over a second ahead of its stream.
-  kPaused,     ///< Came while map updating was disabled.
-  kAfterEnd,   ///< Came after the end of the input.
+  kSubsampled,  ///< Left out by the budget in sensor time.
+  kQueueFull,   ///< Dropped because the queue was full.
+  kRejected,    ///< In a packet that contradicts its camera, or over a second ahead of its stream.
+  kPaused,      ///< Came while map updating was disabled.
+  kAfterEnd,    ///< Came after the end of the input.
 };
 
 struct EventFateRow {
@@ -60,16 +60,16 @@ inline constexpr EventFateRow kEventFates[] = {
     {EventFate::kOutsideLens, "outside_lens", "outside the lens model", false},
     {EventFate::kOverBudget, "over_budget", "over max_events_per_camera", false},
 
-    {EventFate::kThinned, "thinned", "thinned"},
+    {EventFate::kSubsampled, "thinned", "subsampled"},
     {EventFate::kQueueFull, "dropped", "dropped"},
-    {EventFate::kRefused, "refused", "refused"},
+    {EventFate::kRejected, "refused", "rejected"},
     {EventFate::kPaused, "paused", "paused", false},
     {EventFate::kAfterEnd, "after_end", "after the end"},
 };
 constexpr const EventFateRow& rowOf(EventFate fate) {
   return kEventFates[static_cast<std::size_t>(fate)];
 }
-constexpr bool isOfQueue(EventFate fate) { return fate >= EventFate::kThinned; }
+constexpr bool isOfQueue(EventFate fate) { return fate >= EventFate::kSubsampled; }
 
 /// The number of events by their fates.
 struct EventFates : CountsBy<EventFate, std::size(kEventFates)> {

@@ -61,12 +61,12 @@ void CameraStream::requireValid(EventSpan events) const {
       return t_ns >= -kEndOfTimeNs && t_ns <= kEndOfTimeNs;
     };
     if (!lies_within(event.t_ns) || !lies_within(onTrajectoryClock(event.t_ns))) {
-      refuse(event, index_,
+      reject(event, index_,
              "times must lie within " + formatSeconds(kEndOfTimeNs) +
                  " s, with the camera's offset of " + formatSeconds(time_offset_ns_) + " s too");
     }
     if (event.t_ns < late_before_ns) {
-      refuse(event, index_,
+      reject(event, index_,
              "must not come more than 10 ms after a newer one, that at " +
                  formatSeconds(late_before_ns + kMaxEventDelayNs) + " s");
     }
@@ -124,7 +124,7 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
     return fate.has_value();
   };
   events.erase(std::remove_if(events.begin(), events.end(), isUnwanted), events.end());
-  covered_ns_ = std::max(covered_ns_, *newest_ns_ - kMaxEventDelayNs);
+  complete_ns_ = std::max(complete_ns_, *newest_ns_ - kMaxEventDelayNs);
   try {
     return filter_ ? filter_->insert(events) : buffer_.insert(events);
   } catch (const std::bad_alloc&) {
@@ -133,10 +133,10 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
   }
 }
 
-void CameraStream::coverUntil(std::int64_t t_ns) {
+void CameraStream::setCompleteUntil(std::int64_t t_ns) {
   const std::int64_t own_ns = std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs);
-  covered_ns_ =
-      std::max(covered_ns_, std::clamp(onTrajectoryClock(own_ns), -kEndOfTimeNs, kEndOfTimeNs));
+  complete_ns_ =
+      std::max(complete_ns_, std::clamp(onTrajectoryClock(own_ns), -kEndOfTimeNs, kEndOfTimeNs));
 }
 
 std::optional<std::int64_t> CameraStream::firstFrom(std::int64_t t_ns) const {

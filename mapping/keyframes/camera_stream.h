@@ -37,7 +37,7 @@ class CameraStream {
   /// @return the number of events that came after a newer event.
   std::uint64_t add(std::vector<Event> events, const TimeLimits& limits, std::int64_t released_ns);
   /// Declares that all events before `t_ns` (the camera's own clock) have been added.
-  void coverUntil(std::int64_t t_ns);
+  void setCompleteUntil(std::int64_t t_ns);
   /// Filters the events before a time and moves the events that pass to the buffer. No event before
   /// this time may be added afterwards.
   void filterUntil(std::int64_t t_ns) {
@@ -48,7 +48,7 @@ class CameraStream {
   std::int64_t onTrajectoryClock(std::int64_t t_ns) const { return t_ns + time_offset_ns_; }
   std::optional<std::int64_t> newestNs() const { return newest_ns_; }
   /// Returns the time before which all events have been added.
-  std::int64_t coveredNs() const { return covered_ns_; }
+  std::int64_t completeNs() const { return complete_ns_; }
   const EventCounts& counts() const { return counts_; }
 
   EventSpan between(std::int64_t t0_ns, std::int64_t t1_ns) const {
@@ -88,7 +88,7 @@ class CameraStream {
   std::vector<Window> dropped_;      // times of windows that were dropped, in order
   std::size_t pose_cursor_ = 0;
   std::optional<std::int64_t> newest_ns_;
-  std::int64_t covered_ns_ = kMinTimeNs;
+  std::int64_t complete_ns_ = kMinTimeNs;
   EventCounts counts_;
 };
 

@@ -116,8 +116,8 @@ void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
 }
 
-void FusionMapper::coverAllUntil(std::int64_t t_ns) {
-  for (CameraStream& camera : cameras_) camera.coverUntil(t_ns - camera.onTrajectoryClock(0));
+void FusionMapper::setAllCompleteUntil(std::int64_t t_ns) {
+  for (CameraStream& camera : cameras_) camera.setCompleteUntil(t_ns - camera.onTrajectoryClock(0));
   if (!start_ns_) dropWindowsBefore(t_ns, DropReason::kNoPose);
 }
 
@@ -127,7 +127,7 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
     const StageScope scope(stages, Stage::kFilter);
     filterEvents();
   }
-  while (const std::optional<Window> window = coveredWindow()) {
+  while (const std::optional<Window> window = completeWindow()) {
     failed_ = window;
     std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
     failed_.reset();
@@ -145,7 +145,7 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
 
 std::optional<Window> FusionMapper::nextWindow() {
   filterEvents();
-  return coveredWindow();
+  return completeWindow();
 }
 
 std::optional<WindowData> FusionMapper::window() {
@@ -247,12 +247,12 @@ void FusionMapper::setPlanes(const DepthPlanesOptions& planes) {
 }
 
 /// Returns the current window if it is complete: all of its events and poses are here.
-std::optional<Window> FusionMapper::coveredWindow() {
+std::optional<Window> FusionMapper::completeWindow() {
   findStart();
   if (!start_ns_) return std::nullopt;
   skipEmptyWindows();
   const std::optional<Window> window = policy_->current(*this);
-  return window && isCovered(*window) ? window : lastWindow();
+  return window && isComplete(*window) ? window : lastWindow();
 }
 
 /// Returns the window that ends with the recording, once all other windows are mapped. The events
@@ -311,7 +311,7 @@ void FusionMapper::skipEmptyWindows() {
 
 /// Returns whether a window is complete: all of its events and poses are here. `only_window` is
 /// complete after `finish` in any case.
-bool FusionMapper::isCovered(const Window& window) const {
+bool FusionMapper::isComplete(const Window& window) const {
   if (options_.only_window) {
     if (finished_) return true;
     if (reachedNs() < window.t1_ns) return false;
@@ -383,7 +383,7 @@ std::int64_t FusionMapper::completeUntil(const CameraStream& camera) const {
   // The beginning of packets is compared: during a long packet of another camera, this camera need
   // not have delivered yet.
   const std::int64_t silent_ns = packet_ns_ ? *packet_ns_ - kMaxCameraLagNs : kMinTimeNs;
-  return std::max(camera.coveredNs(), silent_ns);
+  return std::max(camera.completeNs(), silent_ns);
 }
 
 std::int64_t FusionMapper::eventsCompleteNs() const {

@@ -129,12 +129,12 @@ class FusionMapper : private RecordingProgress {
   /// a camera without events does not delay other cameras. Without this call, a camera's events are
   /// complete until 10 ms before its newest event. A camera is silent if it has no event in the
   /// last second before the newest packet of any camera begins. A silent camera delays no other.
-  void coverUntil(int camera, std::int64_t t_ns) {
-    cameras_.at(static_cast<std::size_t>(camera)).coverUntil(t_ns);
+  void setCompleteUntil(int camera, std::int64_t t_ns) {
+    cameras_.at(static_cast<std::size_t>(camera)).setCompleteUntil(t_ns);
   }
   /// Does the same for all cameras, with `t_ns` on the trajectory's clock. Poses before `t_ns` are
   /// forgotten if no window needs them.
-  void coverAllUntil(std::int64_t t_ns);
+  void setAllCompleteUntil(std::int64_t t_ns);
   /// Declares that no more data will come. Windows that are not full are not mapped: the last
   /// window begins earlier (`fill_last_window`). A recording shorter than a window has no keyframe.
   void finish() { finished_ = true; }
@@ -190,11 +190,11 @@ class FusionMapper : private RecordingProgress {
   void filterEvents();
   void findStart();
   void skipEmptyWindows();
-  std::optional<Window> coveredWindow();
+  std::optional<Window> completeWindow();
   std::optional<Window> lastWindow();
   std::vector<EventSpan> eventsOf(const Window& window) const;
   void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason);
-  bool isCovered(const Window& window) const;
+  bool isComplete(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);
   KeyframeMapper& keyframeMapper() const;
   std::int64_t releasableUntil() const;

@@ -14,24 +14,24 @@
 namespace efm {
 namespace {
 
-[[noreturn]] void refusePoint(const CloudPoint& point, const std::string& why) {
+[[noreturn]] void rejectPoint(const CloudPoint& point, const std::string& why) {
   throw std::invalid_argument("point " + pointText(point) + ": " + why);
 }
 
-[[noreturn]] void refuseMissing(std::uint64_t keyframe) {
+[[noreturn]] void rejectMissing(std::uint64_t keyframe) {
   throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
 }
 
 /// Number of bits for the keyframes with lower numbers, and for those with higher numbers.
 constexpr unsigned kLowerBits = GlobalCloud::kMaxNumberDifference;
 
-void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) {
+void requireNotFinalized(std::uint64_t keyframe, std::uint64_t from) {
   if (keyframe >= from) return;
   throw std::invalid_argument("keyframe " + std::to_string(keyframe) +
                               ": the keyframes around it are merged for good");
 }
 
-/// Returns the first number of `SettledVoxel::recent`.
+/// Returns the first number of `FinalizedVoxel::recent`.
 std::uint64_t recentFrom(std::uint64_t below) {
   return below < kLowerBits ? 0 : below - kLowerBits;
 }
@@ -69,7 +69,7 @@ void GlobalCloud::Sums::add(const Sums& other) {
 
 void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
                          const std::optional<Rigid3>& T_world_ref) {
-  if (settled_below_ > 0) requireUnsettled(keyframe, settled_below_ + kMaxNumberDifference);
+  if (finalized_below_ > 0) requireNotFinalized(keyframe, finalized_below_ + kMaxNumberDifference);
   if (keyframes_.count(keyframe) != 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is in the map already");
   }
@@ -79,9 +79,9 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
 
 void GlobalCloud::replace(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
                           const std::optional<Rigid3>& T_world_ref) {
-  requireUnsettled(keyframe, settled_below_);
+  requireNotFinalized(keyframe, finalized_below_);
   const auto replaced = keyframes_.find(keyframe);
-  if (replaced == keyframes_.end()) refuseMissing(keyframe);
+  if (replaced == keyframes_.end()) rejectMissing(keyframe);
   Keyframe made = keyframeOf(points, T_world_ref);
   forgetVerdictsOf(keyframe);
   replaced->second = std::move(made);
@@ -152,8 +152,8 @@ void GlobalCloud::checkMutually(std::uint64_t number) {
 }
 
 void GlobalCloud::remove(std::uint64_t keyframe) {
-  requireUnsettled(keyframe, settled_below_);
-  if (keyframes_.erase(keyframe) == 0) refuseMissing(keyframe);
+  requireNotFinalized(keyframe, finalized_below_);
+  if (keyframes_.erase(keyframe) == 0) rejectMissing(keyframe);
   forgetVerdictsOf(keyframe);
 }
 
@@ -199,20 +199,20 @@ void GlobalCloud::visitVoxels(std::uint64_t below, const Visit& visit) const {
   std::make_heap(runs.begin(), runs.end(), comes_later);
 
   MergedVoxel voxel;
-  auto settled = settled_.begin();
-  while (!runs.empty() || settled != settled_.end()) {
-    const bool starts_settled = settled != settled_.end() &&
-                                (runs.empty() || !(runs.front().index() < settled->sums.index));
-    voxel.sums = starts_settled ? settled->sums : Sums{};
-    voxel.first = starts_settled ? settled->first : std::numeric_limits<std::uint64_t>::max();
-    voxel.older = starts_settled ? settled->older : 0;
+  auto finalized = finalized_.begin();
+  while (!runs.empty() || finalized != finalized_.end()) {
+    const bool starts_finalized = finalized != finalized_.end() &&
+                                  (runs.empty() || !(runs.front().index() < finalized->sums.index));
+    voxel.sums = starts_finalized ? finalized->sums : Sums{};
+    voxel.first = starts_finalized ? finalized->first : std::numeric_limits<std::uint64_t>::max();
+    voxel.older = starts_finalized ? finalized->older : 0;
     voxel.supporting.clear();
-    if (starts_settled) {
+    if (starts_finalized) {
       for (unsigned bit = 0; bit < 2 * kLowerBits; ++bit) {
-        if ((settled->recent >> bit & 1U) == 0) continue;
-        voxel.supporting.push_back(recentFrom(settled_below_) + bit);
+        if ((finalized->recent >> bit & 1U) == 0) continue;
+        voxel.supporting.push_back(recentFrom(finalized_below_) + bit);
       }
-      ++settled;
+      ++finalized;
     } else {
       voxel.sums.index = runs.front().index();
     }
@@ -241,13 +241,13 @@ void GlobalCloud::visitVoxels(std::uint64_t below, const Visit& visit) const {
   }
 }
 
-void GlobalCloud::settle(std::uint64_t below) {
-  if (below <= settled_below_) return;
+void GlobalCloud::finalize(std::uint64_t below) {
+  if (below <= finalized_below_) return;
   const std::uint64_t recent_from = recentFrom(below);
-  std::vector<SettledVoxel> settled;
-  settled.reserve(settled_.size());
+  std::vector<FinalizedVoxel> finalized;
+  finalized.reserve(finalized_.size());
   visitVoxels(below, [&](const MergedVoxel& voxel) {
-    SettledVoxel merged{voxel.sums, voxel.first, voxel.older, 0};
+    FinalizedVoxel merged{voxel.sums, voxel.first, voxel.older, 0};
     for (const std::uint64_t number : voxel.supporting) {
       if (number < recent_from) {
         ++merged.older;
@@ -255,16 +255,16 @@ void GlobalCloud::settle(std::uint64_t below) {
         merged.recent = static_cast<std::uint16_t>(merged.recent | 1U << (number - recent_from));
       }
     }
-    settled.push_back(merged);
+    finalized.push_back(merged);
   });
-  settled_ = std::move(settled);
+  finalized_ = std::move(finalized);
   const auto end = keyframes_.lower_bound(below);
-  settled_keyframes_ += static_cast<std::size_t>(std::distance(keyframes_.begin(), end));
+  finalized_keyframes_ += static_cast<std::size_t>(std::distance(keyframes_.begin(), end));
   keyframes_.erase(keyframes_.begin(), end);
-  settled_below_ = below;
+  finalized_below_ = below;
 }
 
-std::size_t GlobalCloud::unsettledVoxels(std::uint64_t below) const {
+std::size_t GlobalCloud::unfinalizedVoxels(std::uint64_t below) const {
   std::size_t count = 0;
   for (auto at = keyframes_.begin(); at != keyframes_.end() && at->first < below; ++at) {
     count += at->second.voxels.size();
@@ -282,15 +282,15 @@ MapCloud::ConstPtr GlobalCloud::points(int min_keyframes) const {
 }
 
 GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const {
-  if (!point.p_world.allFinite()) refusePoint(point, "the position is not finite");
+  if (!point.p_world.allFinite()) rejectPoint(point, "the position is not finite");
   if (!(point.confidence > 0) || !std::isfinite(point.confidence)) {
-    refusePoint(point, "the confidence must be finite and above 0");
+    rejectPoint(point, "the confidence must be finite and above 0");
   }
   // 2^63 is exact in double, the largest 64-bit integer is not.
   constexpr double kIndexLimit = 9223372036854775808.0;
   const Eigen::Vector3d cell = (point.p_world / options_.voxel_size_m).array().floor();
   if (!(cell.minCoeff() >= -kIndexLimit && cell.maxCoeff() < kIndexLimit)) {
-    refusePoint(point, "too far from the origin for voxels of " +
+    rejectPoint(point, "too far from the origin for voxels of " +
                            std::to_string(options_.voxel_size_m) + " m");
   }
   return {{static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),

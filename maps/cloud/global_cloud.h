@@ -98,17 +98,17 @@ class GlobalCloud {
   /// @param below all keyframes below `below` + `kMaxNumberDifference` are in the map, or never
   /// will be: from now on `insert` rejects them, and `remove` and `replace` reject the keyframes
   /// below `below`. Keyframes from `below` on may change, but their verdicts on merged points stay.
-  void settle(std::uint64_t below);
-  /// The numbers of voxels that `settle` has merged, and that it would merge.
-  std::size_t settledVoxels() const { return settled_.size(); }
-  std::size_t unsettledVoxels(std::uint64_t below) const;
+  void finalize(std::uint64_t below);
+  /// The numbers of voxels that `finalize` has merged, and that it would merge.
+  std::size_t finalizedVoxels() const { return finalized_.size(); }
+  std::size_t unfinalizedVoxels(std::uint64_t below) const;
 
   /// Returns the points with a support of at least `min_keyframes`, sorted by voxel (x, y, z).
   /// Cost: merging the voxels of all keyframes.
   MapCloud::ConstPtr points() const { return points(options_.min_keyframes); }
   MapCloud::ConstPtr points(int min_keyframes) const;
 
-  std::size_t keyframes() const { return settled_keyframes_ + keyframes_.size(); }
+  std::size_t keyframes() const { return finalized_keyframes_ + keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
 
  private:
@@ -152,10 +152,10 @@ class GlobalCloud {
 
   /// A voxel of finalized keyframes. Its supporting keyframes are counted. The numbers near the
   /// first keyframe that is not final are known, because later keyframes may add the same supports.
-  struct SettledVoxel {
+  struct FinalizedVoxel {
     Sums sums;
     std::uint64_t first = 0;   ///< The lowest number of a keyframe that supports it.
-    std::uint32_t older = 0;   ///< Supporters below `settled_below_` - kMaxNumberDifference.
+    std::uint32_t older = 0;   ///< Supporters below `finalized_below_` - kMaxNumberDifference.
     std::uint16_t recent = 0;  ///< Supporters: a bit for each number from there on.
   };
   /// A voxel of all keyframes.
@@ -185,9 +185,9 @@ class GlobalCloud {
 
   GlobalCloudOptions options_;
   std::map<std::uint64_t, Keyframe> keyframes_;  // by number; without the finalized keyframes
-  std::vector<SettledVoxel> settled_;            // sorted
-  std::uint64_t settled_below_ = 0;              // keyframes below this number are final
-  std::size_t settled_keyframes_ = 0;
+  std::vector<FinalizedVoxel> finalized_;        // sorted
+  std::uint64_t finalized_below_ = 0;            // keyframes below this number are final
+  std::size_t finalized_keyframes_ = 0;
 };
 
 }  // namespace efm

@@ -101,21 +101,21 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
     forgetNewest();
     throw;
   }
-  settle();
+  finalize();
 }
 
 /// Finalizes the keyframes that cannot change any more, if there are enough voxels: neither they
 /// nor the keyframes that check them may move from now on.
-void RefinedCloud::settle() {
+void RefinedCloud::finalize() {
   constexpr std::size_t kMinVoxels = 200'000;  // about 15 MB
   constexpr std::uint64_t kCheckers = GlobalCloud::kMaxNumberDifference;
   const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
   if (newest < movable_ || newest - movable_ < kCheckers) return;
   const std::uint64_t below = newest - movable_ - kCheckers;
-  if (cloud_.unsettledVoxels(below) < std::max(kMinVoxels, cloud_.settledVoxels() / 2)) return;
+  if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) return;
   const std::uint64_t first_movable = below + kCheckers;
   if (movable_ > 0 && first_movable > fixed_) freeze(first_movable - fixed_);
-  cloud_.settle(below);
+  cloud_.finalize(below);
 }
 
 /// Moves the keyframes below a number for the last time, and forgets their points.

@@ -82,7 +82,7 @@ class RefinedCloud {
  private:
   void put(std::size_t keyframe, const Rigid3& T_world_ref);
   void forgetNewest();
-  void settle();
+  void finalize();
   void freeze(std::size_t below);
 
   struct KeptPoints {

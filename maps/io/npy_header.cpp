@@ -193,18 +193,18 @@ void setNpyType(std::string_view descr, NpyHeader& header) {
 
 std::vector<std::uint64_t> npyShapeOf(std::string_view text, std::size_t element_bytes) {
   const std::size_t end = text.find(')');
-  const auto refuse = [&] {
+  const auto reject = [&] {
     return wrongNpyHeader(
         "shape = " + inQuotes(text.substr(0, end == std::string_view::npos ? 40 : end + 1)) +
         ": expected a list of sizes, with at most 2^53 numbers in all");
   };
-  if (text.empty() || text.front() != '(' || end == std::string_view::npos) throw refuse();
+  if (text.empty() || text.front() != '(' || end == std::string_view::npos) throw reject();
   constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 53;
   std::vector<std::uint64_t> shape;
   std::uint64_t count = std::max<std::size_t>(1, element_bytes / 8);  // in units of 8 bytes
   for (const std::string_view word : splitWords(text.substr(1, end - 1), " ,")) {
     const std::optional<std::uint64_t> size = parseNumber<std::uint64_t>(word);
-    if (!size || *size > kMaxCount || (*size > 0 && count > kMaxCount / *size)) throw refuse();
+    if (!size || *size > kMaxCount || (*size > 0 && count > kMaxCount / *size)) throw reject();
     count *= *size;
     shape.push_back(*size);
   }

@@ -29,13 +29,13 @@ HeaderLines readHeaderLines(TextScanner& scanner) {
     if (line.words.empty() || line.words[0].front() == '#') continue;
     const std::string key(line.words[0] == "COLUMNS" ? "FIELDS" : line.words[0]);
     if (kKeys.find(" " + key + " ") == std::string_view::npos) {
-      line.refuse(inQuotes(key) + ": expected one of" + std::string(kKeys) + "(a PCD header)");
+      line.reject(inQuotes(key) + ": expected one of" + std::string(kKeys) + "(a PCD header)");
     }
-    if (!lines.emplace(key, line).second) line.refuse(key + " again: expected it once");
+    if (!lines.emplace(key, line).second) line.reject(key + " again: expected it once");
   }
   for (const char* key : {"FIELDS", "SIZE", "TYPE", "POINTS"}) {
     if (lines.count(key) != 0) continue;
-    lines.at("DATA").refuse("DATA ends the header: expected " + std::string(key) + " before it");
+    lines.at("DATA").reject("DATA ends the header: expected " + std::string(key) + " before it");
   }
   return lines;
 }
@@ -49,7 +49,7 @@ NumberType numberType(const WordLine& types, const WordLine& sizes, std::size_t 
                         static_cast<std::size_t>(size[0] - '0'));
   }
   if (!type) {
-    types.refuse("TYPE " + inQuotes(kind) + " of SIZE " + inQuotes(size) +
+    types.reject("TYPE " + inQuotes(kind) + " of SIZE " + inQuotes(size) +
                  ": expected I or U of 1, 2, 4 or 8 bytes, or F of 4 or 8");
   }
   return *type;
@@ -61,7 +61,7 @@ std::vector<RecordField> fieldsOf(const HeaderLines& lines) {
   for (const char* key : {"SIZE", "TYPE", "COUNT"}) {
     const auto line = lines.find(key);
     if (line == lines.end() || line->second.words.size() == words) continue;
-    line->second.refuse(std::to_string(line->second.words.size() - 1) + " values: expected " +
+    line->second.reject(std::to_string(line->second.words.size() - 1) + " values: expected " +
                         std::to_string(words - 1) + ", as many as FIELDS has");
   }
   const auto counts = lines.find("COUNT");
@@ -70,7 +70,7 @@ std::vector<RecordField> fieldsOf(const HeaderLines& lines) {
   for (std::size_t word = 1; word < words; ++word) {
     const std::uint64_t count = counts == lines.end() ? 1 : counts->second.count(word);
     if (count < 1 || count > kMaxCount) {
-      counts->second.refuse("COUNT " + std::to_string(count) + ": expected 1 to " +
+      counts->second.reject("COUNT " + std::to_string(count) + ": expected 1 to " +
                             std::to_string(kMaxCount));
     }
     fields.push_back({std::string(lines.at("FIELDS").words[word]),
@@ -80,7 +80,7 @@ std::vector<RecordField> fieldsOf(const HeaderLines& lines) {
   return fields;
 }
 
-std::uint64_t pointsOf(const HeaderLines& lines) {
+std::uint64_t numberOfPoints(const HeaderLines& lines) {
   const WordLine& line = lines.at("POINTS");
   const std::uint64_t points = line.count(1);
   const auto width_line = lines.find("WIDTH");
@@ -91,7 +91,7 @@ std::uint64_t pointsOf(const HeaderLines& lines) {
   const bool agree =
       width == 0 || height == 0 ? points == 0 : points % width == 0 && points / width == height;
   if (!agree) {
-    line.refuse("POINTS " + std::to_string(points) + ": expected WIDTH x HEIGHT, " +
+    line.reject("POINTS " + std::to_string(points) + ": expected WIDTH x HEIGHT, " +
                 std::to_string(width) + " x " + std::to_string(height));
   }
   return points;
@@ -111,7 +111,7 @@ Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto number =
         axis + 1 < line.words.size() ? parseFinite(line.words[axis + 1]) : std::nullopt;
-    if (!number) line.refuse("VIEWPOINT: expected 7 numbers, the origin of the points first");
+    if (!number) line.reject("VIEWPOINT: expected 7 numbers, the origin of the points first");
     origin[static_cast<Eigen::Index>(axis)] = *number;
   }
   return origin;
@@ -123,18 +123,18 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
   fields.erase(std::remove_if(fields.begin(), fields.end(), is_padding),
                fields.end());  // a compressed file has no padding
 
-  if (scanner.left() < 8) scanner.refuse("expected the sizes of the compressed points, 8 bytes");
+  if (scanner.left() < 8) scanner.reject("expected the sizes of the compressed points, 8 bytes");
   const std::uint64_t packed_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
   const std::uint64_t plain_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
   const std::size_t record_bytes = std::max<std::size_t>(bytesOf(fields), 1);
   if (plain_bytes % record_bytes != 0 || plain_bytes / record_bytes != points) {
-    scanner.refuse(std::to_string(plain_bytes) + " bytes when decompressed: expected " +
+    scanner.reject(std::to_string(plain_bytes) + " bytes when decompressed: expected " +
                    std::to_string(points) + " points of " + std::to_string(record_bytes) +
                    " bytes");
   }
   constexpr std::uint64_t kMaxRatio = 88;  // of LZF: 3 bytes unpack to 264 at most
   if (scanner.left() < packed_bytes || plain_bytes > packed_bytes * kMaxRatio) {
-    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+    scanner.reject(std::to_string(scanner.left()) + " bytes are left: expected " +
                    std::to_string(packed_bytes) + " that decompress to " +
                    std::to_string(plain_bytes) + ": is the file cut short?");
   }
@@ -144,7 +144,7 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
   if (!plain.empty() &&
       lzf_decompress(packed.data(), static_cast<unsigned int>(packed.size()), plain.data(),
                      static_cast<unsigned int>(plain.size())) != plain.size()) {
-    packed_start.refuse(std::to_string(packed_bytes) + " compressed bytes: expected " +
+    packed_start.reject(std::to_string(packed_bytes) + " compressed bytes: expected " +
                         std::to_string(plain_bytes) + " when decompressed: is the file damaged?");
   }
   TextScanner plain_scanner(plain);
@@ -180,7 +180,7 @@ PointCloudContent parsePcd(std::string_view bytes) {
   TextScanner scanner(bytes);
   const HeaderLines lines = readHeaderLines(scanner);
   const std::vector<RecordField> fields = fieldsOf(lines);
-  const std::uint64_t points = pointsOf(lines);
+  const std::uint64_t points = numberOfPoints(lines);
   const WordLine& data = lines.at("DATA");
   const std::string_view encoding = data.words.size() == 2 ? data.words[1] : std::string_view{};
 
@@ -192,7 +192,7 @@ PointCloudContent parsePcd(std::string_view bytes) {
   } else if (encoding == "binary_compressed") {
     content = readCompressed(scanner, fields, points);
   } else {
-    data.refuse("DATA " + inQuotes(encoding) + ": expected ascii, binary or binary_compressed");
+    data.reject("DATA " + inQuotes(encoding) + ": expected ascii, binary or binary_compressed");
   }
   scanner.expectEnd();
   const Eigen::Vector3d origin = originOf(lines, fields);

@@ -66,7 +66,7 @@ NumberType numberType(const WordLine& line, std::string_view name) {
   };
   const auto type = known.find(name);
   if (type == known.end()) {
-    line.refuse("type " + inQuotes(name) +
+    line.reject("type " + inQuotes(name) +
                 ": expected char, uchar, short, ushort, int, uint, float, double or the same with "
                 "their bits (int8 to float64)");
   }
@@ -79,7 +79,7 @@ std::string readFormat(const WordLine& line) {
                       line.words[1] == "binary_big_endian") &&
                      line.words[2] == "1.0";
   if (!known) {
-    line.refuse(
+    line.reject(
         "not a known format: expected format ascii 1.0, format binary_little_endian 1.0 or "
         "format binary_big_endian 1.0");
   }
@@ -87,21 +87,21 @@ std::string readFormat(const WordLine& line) {
 }
 
 void readProperty(const WordLine& line, std::vector<PlyElement>& elements) {
-  if (elements.empty()) line.refuse("a property: expected an element before it");
+  if (elements.empty()) line.reject("a property: expected an element before it");
   PlyElement& element = elements.back();
   if (line.words.size() == 5 && line.words[1] == "list") {
     element.list_line = line.number;
     return;
   }
   if (line.words.size() != 3) {
-    line.refuse("expected property TYPE NAME or property list TYPE TYPE NAME");
+    line.reject("expected property TYPE NAME or property list TYPE TYPE NAME");
   }
   element.fields.push_back({std::string(line.words[2]), numberType(line, line.words[1]), 1});
 }
 
 PlyHeader readHeader(TextScanner& scanner) {
   if (scanner.line("ply, as the first line of a PLY file") != "ply") {
-    WordLine{1, {}}.refuse("not a PLY file: expected ply");
+    WordLine{1, {}}.reject("not a PLY file: expected ply");
   }
   PlyHeader header;
   while (true) {
@@ -111,14 +111,14 @@ PlyHeader readHeader(TextScanner& scanner) {
     if (header.format.empty()) {
       header.format = readFormat(line);
     } else if (key == "element") {
-      if (line.words.size() != 3) line.refuse("expected element NAME COUNT");
+      if (line.words.size() != 3) line.reject("expected element NAME COUNT");
       header.elements.push_back({std::string(line.words[1]), line.count(2), {}, 0});
     } else if (key == "property") {
       readProperty(line, header.elements);
     } else if (key == "end_header") {
       return header;
     } else {
-      line.refuse(inQuotes(key) + ": expected comment, obj_info, element, property or end_header");
+      line.reject(inQuotes(key) + ": expected comment, obj_info, element, property or end_header");
     }
   }
 }
@@ -130,13 +130,13 @@ void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
     return;
   }
   if (element.list_line != 0 && element.count != 0) {
-    WordLine{element.list_line, {}}.refuse("a list in element " + printable(element.name) +
+    WordLine{element.list_line, {}}.reject("a list in element " + printable(element.name) +
                                            ": expected lists behind element vertex alone");
   }
   const std::size_t bytes = bytesOf(element.fields);
   if (bytes == 0) return;
   if (scanner.left() / bytes < element.count) {
-    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+    scanner.reject(std::to_string(scanner.left()) + " bytes are left: expected " +
                    std::to_string(element.count) + " elements " + printable(element.name) + " of " +
                    std::to_string(bytes) + " bytes: is the file cut short?");
   }
@@ -177,10 +177,10 @@ PointCloudContent parsePly(std::string_view bytes) {
       std::find_if(header.elements.begin(), header.elements.end(),
                    [](const PlyElement& element) { return element.name == "vertex"; });
   if (vertex == header.elements.end()) {
-    end_of_header.refuse("end_header without an element vertex: expected one before");
+    end_of_header.reject("end_header without an element vertex: expected one before");
   }
   if (vertex->list_line != 0) {
-    WordLine{vertex->list_line, {}}.refuse("a list in element vertex: expected single numbers");
+    WordLine{vertex->list_line, {}}.reject("a list in element vertex: expected single numbers");
   }
   for (auto before = header.elements.begin(); before != vertex; ++before) {
     skip(scanner, *before, is_text);

@@ -34,23 +34,23 @@ std::string_view TextScanner::take(std::size_t bytes) {
   return taken;
 }
 
-void TextScanner::refuse(const std::string& why) const {
+void TextScanner::reject(const std::string& why) const {
   throw std::runtime_error("byte " + std::to_string(bytes_.size() - rest_.size()) + ": " + why);
 }
 
 void TextScanner::expectEnd() const {
   if (rest_.find_first_not_of(" \t\r\n") == std::string_view::npos) return;
-  refuse(std::to_string(rest_.size()) + " more bytes: expected the end of the file");
+  reject(std::to_string(rest_.size()) + " more bytes: expected the end of the file");
 }
 
-void WordLine::refuse(const std::string& why) const {
+void WordLine::reject(const std::string& why) const {
   throw std::runtime_error("line " + std::to_string(number) + ": " + why);
 }
 
 std::uint64_t WordLine::count(std::size_t word) const {
   const std::string_view text = word < words.size() ? words[word] : std::string_view{};
   const std::optional<std::uint64_t> count = parseNumber<std::uint64_t>(text);
-  if (!count) refuse(inQuotes(text) + ": expected a whole number from 0 on");
+  if (!count) reject(inQuotes(text) + ": expected a whole number from 0 on");
   return *count;
 }
 
@@ -153,7 +153,7 @@ PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<Record
         wordLine(scanner, "point " + std::to_string(i + 1) + " of " + std::to_string(count));
     if (line.words.empty()) continue;
     if (line.words.size() != numbers) {
-      line.refuse("point " + std::to_string(i + 1) + " has " + std::to_string(line.words.size()) +
+      line.reject("point " + std::to_string(i + 1) + " has " + std::to_string(line.words.size()) +
                   " numbers: expected " + std::to_string(numbers));
     }
     Values values = {0, 0, 0, 1};
@@ -162,7 +162,7 @@ PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<Record
       for (std::size_t n = 0; n < fields[at].count; ++n, ++word) {
         double value = 0;
         if (!parseAs(fields[at].type, *word, value)) {
-          line.refuse(printable(fields[at].name) + " " + inQuotes(*word) +
+          line.reject(printable(fields[at].name) + " " + inQuotes(*word) +
                       ": expected a number of the field's type");
         }
         for (std::size_t j = 0; j < indices.size(); ++j) {
@@ -181,7 +181,7 @@ PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<Reco
   const FieldIndices indices = findFields(fields);
   const std::size_t record_bytes = bytesOf(fields);
   if (scanner.left() / record_bytes < count) {
-    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+    scanner.reject(std::to_string(scanner.left()) + " bytes are left: expected " +
                    std::to_string(count) + " points of " + std::to_string(record_bytes) +
                    " bytes: is the file cut short?");
   }

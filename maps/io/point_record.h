@@ -31,7 +31,7 @@ class TextScanner {
   std::size_t lineNumber() const { return lines_; }
 
   /// @throws std::runtime_error naming the next byte, counted from 0.
-  [[noreturn]] void refuse(const std::string& why) const;
+  [[noreturn]] void reject(const std::string& why) const;
   /// @throws std::runtime_error if anything but white space is left.
   void expectEnd() const;
 
@@ -47,7 +47,7 @@ struct WordLine {
   std::vector<std::string_view> words;
 
   /// @throws std::runtime_error naming the line.
-  [[noreturn]] void refuse(const std::string& why) const;
+  [[noreturn]] void reject(const std::string& why) const;
   /// Returns the word with this index as a whole number, 0 or more.
   std::uint64_t count(std::size_t word) const;
 };

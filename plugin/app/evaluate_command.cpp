@@ -36,11 +36,11 @@ std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& argum
 
 /// Rejects a plot that would replace an input. Inputs may be folders whose files are read.
 /// @param third input beside the estimate and the truth; may be empty.
-void refusePlotOver(const EvaluateArguments& arguments, const std::filesystem::path& third = {}) {
+void rejectPlotOver(const EvaluateArguments& arguments, const std::filesystem::path& third = {}) {
   if (arguments.plot.empty()) return;
   const std::vector<std::filesystem::path> inputs = {arguments.estimate, arguments.truth, third};
-  refuseToReplace(arguments.plot, inputs);
-  refuseFileIn(inputs, arguments.plot);
+  rejectReplacing(arguments.plot, inputs);
+  rejectFileIn(inputs, arguments.plot);
 }
 
 /// Writes the plot, if asked for, and prints the errors.
@@ -189,7 +189,7 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
 }  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
-  refusePlotOver(arguments, arguments.options.mask);
+  rejectPlotOver(arguments, arguments.options.mask);
   const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
   DepthEvaluationOptions options = arguments.options;
   if (stereo) options.focal_baseline = stereo->focal_px * stereo->baseline_m;
@@ -199,7 +199,7 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
 }
 
 int runEvaluateMap(const EvaluateMapArguments& arguments) {
-  refusePlotOver(arguments, arguments.options.to_find);
+  rejectPlotOver(arguments, arguments.options.to_find);
   const CloudEvaluation evaluation =
       evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
   return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation),
@@ -207,7 +207,7 @@ int runEvaluateMap(const EvaluateMapArguments& arguments) {
 }
 
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
-  refusePlotOver(arguments);
+  rejectPlotOver(arguments);
   using Unit = RelativeSpacing::Unit;
   TrajectoryEvaluationOptions options = arguments.options;
   options.alignment = valueIn(kTrajectoryAlignments, arguments.alignment);

@@ -24,7 +24,7 @@
 
 namespace efm {
 int runImport(const ImportArguments& arguments) {
-  refuseToReplace(arguments.out, inputsOf(arguments.source));
+  rejectReplacing(arguments.out, inputsOf(arguments.source));
   if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
   RecordingSource source = arguments.source;
   source.complete = false;
@@ -60,7 +60,7 @@ int runImport(const ImportArguments& arguments) {
       progress.show(recording->progress());
     });
     if (all_events == 0 && damage) throw std::runtime_error(*damage);
-    if (all_events == 0) refuseLimitsWithoutEvents(source.limits, *recording);
+    if (all_events == 0) rejectLimitsWithoutEvents(source.limits, *recording);
     if (all_events + poses + others == 0) {
       throw std::runtime_error("the recording holds nothing " + limitsText(source.limits));
     }
@@ -126,7 +126,7 @@ std::vector<std::string> exportFormats() {
 }
 
 int runExport(const ExportArguments& arguments) {
-  refuseToReplace(arguments.out, inputsOf(arguments.source));
+  rejectReplacing(arguments.out, inputsOf(arguments.source));
   if (std::filesystem::is_regular_file(arguments.out)) {  // an empty folder is allowed
     throw std::runtime_error(arguments.out.string() +
                              ": it exists: expected the name of a new file or folder");
@@ -161,7 +161,7 @@ int runExport(const ExportArguments& arguments) {
       progress.show(recording->progress());
     });
   }
-  if (!damage && events == 0) refuseLimitsWithoutEvents(source.limits, *recording);
+  if (!damage && events == 0) rejectLimitsWithoutEvents(source.limits, *recording);
   for (const TruthDepth& truth : openTruth(source)) {
     interruption.check();
     if (source.limits.contain(truth.t_ns)) writer->addTruth(truth.t_ns, truth.file);

@@ -195,7 +195,7 @@ int runInfo(const InfoArguments& arguments) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // warnings of missing parts would be wrong then
-  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source.limits, *recording);
+  if (!contents.statistics.eventSpan()) rejectLimitsWithoutEvents(source.limits, *recording);
   Findings findings{contents.statistics, recording->counts()};
   std::vector<Warning> warnings;
   if (takes) warnings = judge(look, quiet, findings);

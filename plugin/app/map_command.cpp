@@ -193,9 +193,9 @@ std::vector<std::filesystem::path> inputsOf(const MappingArguments& arguments,
 
 /// Rejects a folder with an input. A folder with files that do not belong to an earlier result of
 /// the same kind is probably a mistake.
-void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
+void rejectOutputFolder(const std::filesystem::path& folder, OutputKind kind,
                         const MappingArguments& arguments, const RecordingSource& source) {
-  refuseToReplace(folder, inputsOf(arguments, source));
+  rejectReplacing(folder, inputsOf(arguments, source));
   std::error_code ignored;
   if (arguments.force || !std::filesystem::is_directory(folder, ignored)) return;
   if (std::filesystem::is_empty(folder)) return;
@@ -247,7 +247,7 @@ class MapCommand {
   void endTimes(const KeyframeWriter& writer);
   /// Writes the report, and prints the warnings, the summary and the error.
   /// @return the exit status.
-  int conclude(std::optional<UserError> error);
+  int writeReport(std::optional<UserError> error);
   /// Throws the current error again, as text for the user; called within a handler.
   /// @param written number of keyframes in the folder.
   [[noreturn]] void rethrow(int written) const;
@@ -267,7 +267,7 @@ void MapCommand::begin() {
   began_ = std::chrono::steady_clock::now();
   const std::filesystem::path folder = outputFolder(arguments, kind);
   const RecordingSource all = source();
-  refuseOutputFolder(folder, kind, arguments, all);
+  rejectOutputFolder(folder, kind, arguments, all);
   report.warnings = replacementWarnings(folder, all);
   printWarnings(report.warnings);
   recording = firstLook();
@@ -408,7 +408,7 @@ std::string MapCommand::stays() const {
   return fmt::format("; the earlier result in {} stays", output->folder().string());
 }
 
-int MapCommand::conclude(std::optional<UserError> error) {
+int MapCommand::writeReport(std::optional<UserError> error) {
   if (!error) error = write_error_;
   report.peak_memory_bytes = peakMemoryBytes();
   // The result of an earlier run stays if this run has no keyframe or cannot write a file.
@@ -448,10 +448,10 @@ void MapCommand::rethrow(int written) const {
     if (const auto wrong = reader.wrongOption(error)) throw UsageError(*wrong);
     throw;
   } catch (const std::runtime_error& error) {
-    if (output && output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays());
+    if (output && output->keepsEarlier()) throw std::runtime_error(userMessage(error) + stays());
     if (written == 0) throw;
     throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
-                                         inWords(error), written, output->folder().string()));
+                                         userMessage(error), written, output->folder().string()));
   }
 }
 
@@ -461,7 +461,7 @@ class Watchers {
   Watchers(const MapArguments& arguments, const MapCommand& command) {
     if (arguments.view) all_.push_back(window_ = openWindow());
     if (arguments.record_frames.empty()) return;
-    refuseToReplace(arguments.record_frames, inputsOf(arguments, command.source()));
+    rejectReplacing(arguments.record_frames, inputsOf(arguments, command.source()));
     all_.push_back(
         mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force));
   }
@@ -591,7 +591,7 @@ int runMap(const MapArguments& arguments) {
     command.judgePoints(*map->points);
     command.endTimes(writer);
     if (has_keyframes) writePage(command, *map, pictures);
-    const int status = command.conclude(run.error());
+    const int status = command.writeReport(run.error());
     watchers.wait(command.interruption);
     return status;
   } catch (...) {
@@ -641,7 +641,7 @@ int runDepth(const DepthArguments& arguments) {
     }
     command.judgePoints(*map->points);
     command.endTimes(writer);
-    return command.conclude(run.error());
+    return command.writeReport(run.error());
   } catch (...) {
     command.rethrow(written);
   }

@@ -173,7 +173,7 @@ double MappingRun::fraction() const {
 std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
   const SessionStatus status = mapper_->status();
   const StageSeconds& now = status.times.real;
-  const StageSeconds before = std::exchange(told_, now);
+  const StageSeconds before = std::exchange(reported_, now);
   std::optional<std::int64_t> start_ns;
   if (status.events) start_ns = status.events->first_ns;
   return fmt::format(

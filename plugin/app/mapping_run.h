@@ -88,7 +88,7 @@ class MappingRun {
   std::vector<KeyframeDepthMap> made_;    // in live operation: not delivered yet
   std::optional<std::int64_t> first_ns_;  // in live operation: time of the first sample
   std::chrono::steady_clock::time_point began_;
-  StageSeconds told_;  // stage times until the last reported keyframe
+  StageSeconds reported_;  // stage times until the last reported keyframe
   Progress progress_;
   std::shared_ptr<Mapper> mapper_;  // last, never null: its thread uses the others
 };

@@ -93,26 +93,26 @@ std::vector<fs::path> inputsOf(const RecordingSource& source) {
   return inputs;
 }
 
-void refuseToReplace(const fs::path& out, const std::vector<fs::path>& inputs) {
+void rejectReplacing(const fs::path& out, const std::vector<fs::path>& inputs) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return;
   const bool is_folder = fs::is_directory(out, ignored);
   for (const fs::path& input : inputs) {
     if (input.empty() || !fs::exists(input, ignored)) continue;
-    const auto refuse = [&](const fs::path& replaced, const char* why) {
+    const auto reject = [&](const fs::path& replaced, const char* why) {
       return std::runtime_error(replaced.string() + why + input.string() +
                                 " itself: expected another " + (is_folder ? "folder" : "file") +
                                 " for the results");
     };
-    if (isSame(input, out)) throw refuse(out, ": it is the input ");
+    if (isSame(input, out)) throw reject(out, ": it is the input ");
     if (!is_folder) continue;
-    if (isBelow(resolved(input), resolved(out))) throw refuse(out, ": it holds the input ");
+    if (isBelow(resolved(input), resolved(out))) throw reject(out, ": it holds the input ");
     const fs::path link = linkTo(input, out);
-    if (!link.empty()) throw refuse(link, ": it is the input ");
+    if (!link.empty()) throw reject(link, ": it is the input ");
   }
 }
 
-void refuseFileIn(const std::vector<fs::path>& folders, const fs::path& out) {
+void rejectFileIn(const std::vector<fs::path>& folders, const fs::path& out) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return;
   for (const fs::path& folder : folders) {

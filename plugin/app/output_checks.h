@@ -25,11 +25,11 @@ std::vector<std::filesystem::path> inputsOf(const RecordingSource& source);
 /// Rejects an output that would replace an input. Links are followed, and hard links are found.
 /// @param out file or folder to write. A folder must neither be an input nor hold an input.
 /// @param inputs empty or missing inputs are ignored.
-void refuseToReplace(const std::filesystem::path& out,
+void rejectReplacing(const std::filesystem::path& out,
                      const std::vector<std::filesystem::path>& inputs);
 
 /// Rejects an existing file in a folder that is read.
-void refuseFileIn(const std::vector<std::filesystem::path>& folders,
+void rejectFileIn(const std::vector<std::filesystem::path>& folders,
                   const std::filesystem::path& out);
 
 }  // namespace efm

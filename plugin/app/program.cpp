@@ -86,7 +86,7 @@ UserError userError(const std::exception& error) {
     return {kOutOfMemory, {{"dsi", "num_planes"}, {"dsi", "width"}}};
   }
   if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
-    return {"the system refuses: " + system->code().message()};  // for example, a thread
+    return {"an error of the system: " + system->code().message()};  // for example, a thread
   }
   const std::string text = withoutPlace(error.what());
   UserError result{text == error.what() ? text : onOneLine(text)};
@@ -95,7 +95,7 @@ UserError userError(const std::exception& error) {
   return result;
 }
 
-std::string inWords(const std::exception& error) { return userError(error).text; }
+std::string userMessage(const std::exception& error) { return userError(error).text; }
 
 int fail(const std::string& message, int status) {
   std::cerr << "event-fusion: error: " << message << "\n";
@@ -114,7 +114,7 @@ int runProgram(int argc, char** argv) {
     std::cerr << "event-fusion: " << interrupted.what() << "\n";
     return kInterruptedStatus;
   } catch (const std::exception& error) {
-    return fail(inWords(error));
+    return fail(userMessage(error));
   }
 }
 

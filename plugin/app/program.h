@@ -51,7 +51,7 @@ UserError userError(const std::exception& error);
 
 /// Returns the text of the error only: one sentence, without the additions of libraries for
 /// programmers (call stacks, places in sources, names of types).
-std::string inWords(const std::exception& error);
+std::string userMessage(const std::exception& error);
 
 /// Runs the program `event-fusion` with a command line. Prints every error to stderr.
 /// @return the exit status: 0 only if the command has done its job and stdout took its output.

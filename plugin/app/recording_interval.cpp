@@ -64,7 +64,7 @@ std::optional<std::string> readAll(Recording& recording, const std::function<voi
     try {
       sample = recording.next();
     } catch (const std::exception& error) {
-      return inWords(error);
+      return userMessage(error);
     }
     if (!sample) return std::nullopt;
     take(std::move(*sample));
@@ -81,7 +81,7 @@ std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts)
                                      : "the nearest events lie at " + nearest);
 }
 
-void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
+void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
   if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
   throw std::runtime_error(noEventText(limits, recording.counts()));
 }

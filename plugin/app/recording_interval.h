@@ -61,7 +61,7 @@ std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts)
 
 /// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
 /// @param recording was read, and had no event.
-void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
+void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
 
 /// Reports the damage that ended a recording, after the data before it were written.
 /// @return the process's exit status.

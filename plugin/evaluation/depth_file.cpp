@@ -106,7 +106,7 @@ cv::Mat1f parseNpy(std::string_view bytes) {
 int side(const WordLine& line, std::size_t word) {
   const std::uint64_t pixels = line.count(word);
   if (pixels < 1 || pixels > kMaxImageSide) {
-    line.refuse(fmt::format("{} pixels: expected from 1 to 65535", pixels));
+    line.reject(fmt::format("{} pixels: expected from 1 to 65535", pixels));
   }
   return static_cast<int>(pixels);
 }
@@ -124,22 +124,22 @@ cv::Mat1f parsePfm(std::string_view bytes) {
   TextScanner cursor(bytes);
   const WordLine kind = wordLine(cursor, "Pf");
   if (kind.words.size() != 1 || kind.words[0] != "Pf") {
-    kind.refuse("expected Pf alone, a grey float map");
+    kind.reject("expected Pf alone, a grey float map");
   }
   const WordLine sides = wordLine(cursor, "width and height");
-  if (sides.words.size() != 2) sides.refuse("expected width and height");
+  if (sides.words.size() != 2) sides.reject("expected width and height");
   const int width = side(sides, 0);
   const int height = side(sides, 1);
   const WordLine line = wordLine(cursor, "the scale");
   const double scale = line.words.size() == 1 ? parseFinite(line.words[0]).value_or(0) : 0;
   if (scale == 0) {
-    line.refuse("expected one number, the scale, below 0 where the data are little endian");
+    line.reject("expected one number, the scale, below 0 where the data are little endian");
   }
 
   cv::Mat1f image(height, width);
   const std::size_t expected = image.total() * sizeof(float);
   if (cursor.left() != expected) {
-    cursor.refuse(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
+    cursor.reject(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
                               expected, width, height));
   }
   const char* at = cursor.take(expected).data();

@@ -21,7 +21,7 @@ std::string originOf(std::string_view line, std::string_view section) {
 }
 
 template <typename... Values>
-[[noreturn]] void refuse(fmt::format_string<Values...> format, Values&&... values) {
+[[noreturn]] void reject(fmt::format_string<Values...> format, Values&&... values) {
   throw std::invalid_argument(fmt::format(format, std::forward<Values>(values)...));
 }
 
@@ -37,7 +37,7 @@ std::string expectedSection(std::string_view section) {
 
 void requireSection(std::string_view origin, std::string_view section) {
   if (isOptionSection(section)) return;
-  refuse("{}: unknown section [{}]: {}", origin, printable(section), expectedSection(section));
+  reject("{}: unknown section [{}]: {}", origin, printable(section), expectedSection(section));
 }
 
 /// Origin of options of the command line.
@@ -117,12 +117,12 @@ void OptionReader::readText(std::string_view text, const OptionOrigin& file) {
     }
     const std::size_t equals = line.find('=');
     if (equals == std::string_view::npos || section.empty()) {
-      refuse("{}: {}: expected [section] or, below a section, key = value", here, inQuotes(line));
+      reject("{}: {}: expected [section] or, below a section, key = value", here, inQuotes(line));
     }
     const std::string key(trimmed(line.substr(0, equals)));
     const auto [first, is_new] = lines.emplace(std::make_pair(section, key), number);
     if (!is_new) {
-      refuse("{} {}: given twice, first in line {}", originOf(here, section), printable(key),
+      reject("{} {}: given twice, first in line {}", originOf(here, section), printable(key),
              first->second);
     }
     assign(section, key, trimmed(line.substr(equals + 1)), {originOf(here, section), file.folder});
@@ -133,7 +133,7 @@ void OptionReader::set(std::string_view assignment) {
   const std::size_t dot = assignment.find('.');
   const std::size_t equals = assignment.find('=');
   if (dot == std::string_view::npos || equals == std::string_view::npos || dot > equals) {
-    refuse("--set {}: expected section.key=value", printable(assignment));
+    reject("--set {}: expected section.key=value", printable(assignment));
   }
   const std::string_view section = trimmed(assignment.substr(0, dot));
   requireSection("--set " + printable(assignment), section);
@@ -144,7 +144,7 @@ void OptionReader::set(std::string_view assignment) {
 void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
                        const OptionOrigin& origin) {
   if (!isOptionSection(section)) {
-    refuse("{} unknown section: {}", origin.name, expectedSection(section));
+    reject("{} unknown section: {}", origin.name, expectedSection(section));
   }
   assign(section, key, trimmed(withoutComment(value)), origin);
 }
@@ -157,9 +157,9 @@ void OptionReader::assign(std::string_view section, std::string_view key, std::s
   try {
     known = setOption(options_, section, key, value, origin.folder);
   } catch (const std::invalid_argument& error) {
-    refuse("{}: {}", text, error.what());
+    reject("{}: {}", text, error.what());
   }
-  if (!known) refuse("{}: {}", keyText(origin, section, key), unknownKey(section, key));
+  if (!known) reject("{}: {}", keyText(origin, section, key), unknownKey(section, key));
   given_[{std::string(section), std::string(key)}] = {text, ++assignments_};
 }
 
@@ -169,12 +169,12 @@ EventFusionOptions OptionReader::options() const {
   try {
     options.validate();
   } catch (const OptionError& error) {  // the structs know neither sections nor files
-    refuseOutOfRange(error);
+    rejectOutOfRange(error);
   }
   return options;
 }
 
-void OptionReader::refuseOutOfRange(const OptionError& error) const {
+void OptionReader::rejectOutOfRange(const OptionError& error) const {
   const std::vector<NamedOption> all = listOptions(options_);
   const auto named = [&](std::string_view key) {
     return std::find_if(all.begin(), all.end(),
@@ -195,13 +195,13 @@ void OptionReader::refuseOutOfRange(const OptionError& error) const {
     const NamedOption& other = *named(key);
     const Given given = find(other);
     if (given.order > own.order) {
-      refuse("{}: contradicts {}, which must be {}", given.text, own_text, error.expected);
+      reject("{}: contradicts {}, which must be {}", given.text, own_text, error.expected);
     }
     others += fmt::format(
         " ({})",
         given.order > 0 ? given.text : fmt::format("{} = {} by default", key, textOf(other.value)));
   }
-  refuse("{}: must be {}{}", own_text, error.expected, others);
+  reject("{}: must be {}{}", own_text, error.expected, others);
 }
 
 std::string OptionReader::origins(const std::vector<OptionId>& options) const {

@@ -62,7 +62,7 @@ class OptionReader {
  private:
   void assign(std::string_view section, std::string_view key, std::string_view value,
               const OptionOrigin& origin);
-  [[noreturn]] void refuseOutOfRange(const OptionError& error) const;
+  [[noreturn]] void rejectOutOfRange(const OptionError& error) const;
 
   struct Given {
     std::string text;

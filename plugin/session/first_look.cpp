@@ -20,7 +20,7 @@ namespace {
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 
-EventPacket thinnedOut(const EventPacket& packet) {
+EventPacket subsampled(const EventPacket& packet) {
   double length_s = 0;
   if (!packet.events.empty()) {
     length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
@@ -85,7 +85,7 @@ FirstLook::FirstLook(const EventFusionOptions& options)
 
 void FirstLook::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
-  for (EventPacket& ready : rig_.add(thinnedOut(packet), mapper_)) feed(std::move(ready));
+  for (EventPacket& ready : rig_.add(subsampled(packet), mapper_)) feed(std::move(ready));
   takeWindows();
 }
 
@@ -95,7 +95,7 @@ void FirstLook::feed(EventPacket packet) {
   const std::int64_t begin_ns = empty ? 0 : packet.events.front().t_ns + offset_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns + offset_ns;
   mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
-  if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
+  if (packet.covered_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.covered_until_ns);
   if (empty) return;
   extend(events_, begin_ns);
   extend(events_, last_ns);

@@ -71,7 +71,7 @@ std::vector<Event> EventBudget::finish() {
 void EventBudget::endInterval(std::vector<Event>& passed) {
   std::vector<Event> buffer;
   const EventSpan chosen = chooseEvenly(held_, max_per_interval_, buffer);
-  thinned_ += held_.size() - chosen.size();
+  subsampled_ += held_.size() - chosen.size();
   passed.insert(passed.end(), chosen.begin(), chosen.end());
   held_.clear();
 }
@@ -82,11 +82,11 @@ void InputQueue::Stream<Input>::follow(std::int64_t t_ns) {
 }
 
 template <typename Input>
-std::optional<Input> InputQueue::Stream<Input>::settle(bool is_right, std::uint64_t& refused) {
+std::optional<Input> InputQueue::Stream<Input>::finalize(bool is_right, std::uint64_t& rejected) {
   std::optional<Input> waited = std::exchange(ahead, std::nullopt);
   if (!waited) return std::nullopt;
   if (!is_right) {
-    ++refused;
+    ++rejected;
     return std::nullopt;
   }
   follow(ahead_ns);
@@ -94,8 +94,8 @@ std::optional<Input> InputQueue::Stream<Input>::settle(bool is_right, std::uint6
 }
 
 template <typename Input>
-std::optional<Input> InputQueue::Stream<Input>::settleLast(std::uint64_t& refused) {
-  return settle(reached_ns && !isFarAfter(ahead_ns, *reached_ns, kMaxLastPauseNs), refused);
+std::optional<Input> InputQueue::Stream<Input>::finalizeLast(std::uint64_t& rejected) {
+  return finalize(reached_ns && !isFarAfter(ahead_ns, *reached_ns, kMaxLastPauseNs), rejected);
 }
 
 InputQueue::InputQueue(const LiveOptions& options) : options_(options) {}
@@ -123,7 +123,7 @@ void InputQueue::add(EventPacket packet) {
                       packet.camera));
     }
   } catch (const std::invalid_argument&) {
-    camera.counts.fates[EventFate::kRefused] += packet.events.size();
+    camera.counts.fates[EventFate::kRejected] += packet.events.size();
     throw;
   }
   takeAhead(camera, packet);
@@ -145,7 +145,7 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
   const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
   if (confirms || !events.empty()) {  // `covered_until_ns` alone rejects nothing
-    if (auto waited = stream.settle(confirms, camera.counts.fates[EventFate::kRefused])) {
+    if (auto waited = stream.finalize(confirms, camera.counts.fates[EventFate::kRejected])) {
       pass(camera, std::move(*waited));
     }
   }
@@ -162,7 +162,7 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
         continue;
       }
       if (isFarAfter(event.t_ns, events[i + 1].t_ns)) {
-        ++camera.counts.fates[EventFate::kRefused];
+        ++camera.counts.fates[EventFate::kRejected];
         continue;
       }
     }
@@ -217,12 +217,12 @@ void InputQueue::skip(const EventPacket& packet) {
 void InputQueue::add(PoseSample pose) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (ended_) {
-    ++refused_poses_;
+    ++rejected_poses_;
     return;
   }
   Stream<PoseSample>& stream = pose_streams_[pose.source];
   const std::int64_t t_ns = pose.t_ns;
-  if (auto waited = stream.settle(!isFarAfter(stream.ahead_ns, t_ns), refused_poses_)) {
+  if (auto waited = stream.finalize(!isFarAfter(stream.ahead_ns, t_ns), rejected_poses_)) {
     poses_.push_back(std::move(*waited));
   }
   if (stream.reached_ns && isFarAfter(t_ns, *stream.reached_ns)) {
@@ -240,7 +240,7 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
-    if (auto last = camera.stream.settleLast(camera.counts.fates[EventFate::kRefused])) {
+    if (auto last = camera.stream.finalizeLast(camera.counts.fates[EventFate::kRejected])) {
       pass(camera, std::move(*last));
     }
     if (!camera.last) continue;
@@ -249,7 +249,7 @@ void InputQueue::end() {
     if (!rest.events.empty()) push(std::move(rest));
   }
   for (auto& [source, stream] : pose_streams_) {
-    if (auto last = stream.settleLast(refused_poses_)) poses_.push_back(std::move(*last));
+    if (auto last = stream.finalizeLast(rejected_poses_)) poses_.push_back(std::move(*last));
   }
   changed_.notify_one();
 }
@@ -301,9 +301,9 @@ std::uint64_t InputQueue::queuedEvents() const {
   return events_;
 }
 
-std::uint64_t InputQueue::refusedPoses() const {
+std::uint64_t InputQueue::rejectedPoses() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return refused_poses_;
+  return rejected_poses_;
 }
 
 std::map<int, QueueCounts> InputQueue::counts() const {
@@ -312,7 +312,7 @@ std::map<int, QueueCounts> InputQueue::counts() const {
   for (const auto& [index, camera] : cameras_) {
     QueueCounts& of_camera = counts[index];
     of_camera = camera.counts;
-    of_camera.fates[EventFate::kThinned] = camera.budget.thinned();
+    of_camera.fates[EventFate::kSubsampled] = camera.budget.subsampled();
     of_camera.held = camera.budget.held() + (camera.stream.ahead ? 1 : 0);
     of_camera.queued =
         of_camera.received - of_camera.held - of_camera.taken - of_camera.fates.total();

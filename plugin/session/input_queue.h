@@ -36,7 +36,7 @@ class EventBudget {
   /// Returns the held events that pass at the end.
   std::vector<Event> finish();
 
-  std::uint64_t thinned() const { return thinned_; }
+  std::uint64_t subsampled() const { return subsampled_; }
   /// Returns the number of events that wait for the end of their 10 ms.
   std::size_t held() const { return held_.size(); }
 
@@ -46,7 +46,7 @@ class EventBudget {
   std::size_t max_per_interval_;
   std::int64_t interval_ = 0;  // number of the current 10 ms
   std::vector<Event> held_;    // events of this interval
-  std::uint64_t thinned_ = 0;
+  std::uint64_t subsampled_ = 0;
 };
 
 /// Returns a packet without events that replaces a packet that is not to be mapped.
@@ -91,7 +91,7 @@ class InputQueue {
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
   /// Returns the number of poses that came after the end, or were far ahead of their source.
-  std::uint64_t refusedPoses() const;
+  std::uint64_t rejectedPoses() const;
 
  private:
   /// Progress of a stream of input.
@@ -104,9 +104,9 @@ class InputQueue {
     /// Takes a new time. The clock may go back.
     void follow(std::int64_t t_ns);
     /// Ends the wait of `ahead`. @return it, if its time is right; otherwise it counts as rejected.
-    std::optional<Input> settle(bool is_right, std::uint64_t& refused);
+    std::optional<Input> finalize(bool is_right, std::uint64_t& rejected);
     /// Ends the wait at the end of the input.
-    std::optional<Input> settleLast(std::uint64_t& refused);
+    std::optional<Input> finalizeLast(std::uint64_t& rejected);
   };
 
   struct Camera {
@@ -133,7 +133,7 @@ class InputQueue {
   std::deque<EventPacket> packets_;
   std::vector<PoseSample> poses_;
   std::map<PoseSourceId, Stream<PoseSample>> pose_streams_;
-  std::uint64_t refused_poses_ = 0;
+  std::uint64_t rejected_poses_ = 0;
   std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_
   std::uint64_t bytes_ = 0;

@@ -51,7 +51,7 @@ void LiveGuard::hold(std::function<void()> input, std::size_t events) {
 }
 
 std::vector<std::function<void()>> LiveGuard::beginClock() {
-  ++status_.clock_steps;
+  ++status_.clock_resets;
   clock_went_back_ = false;
   held_events_ = 0;
   older_.clear();
@@ -135,7 +135,7 @@ std::optional<std::int64_t> LiveGuard::limitWaits(FusionMapper& mapper,
   std::optional<std::int64_t> newest_ns = pose_source.waitingNs();
   if (newest_pose_) {
     newest_ns = jumped() ? after_jump_.back().pose.t_ns : newest_pose_->t_ns;
-    mapper.coverAllUntil(*newest_ns - kMaxEventWaitNs);
+    mapper.setAllCompleteUntil(*newest_ns - kMaxEventWaitNs);
   }
   std::optional<std::int64_t> needed_ns;
   if (newest_ns) {
@@ -154,7 +154,7 @@ std::optional<std::int64_t> LiveGuard::limitWaits(FusionMapper& mapper,
 }
 
 bool LiveGuard::countRejectedPose() {
-  status_.refused_poses += options_.enabled ? 1 : 0;
+  status_.rejected_poses += options_.enabled ? 1 : 0;
   return options_.enabled;
 }
 

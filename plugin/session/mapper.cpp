@@ -378,13 +378,13 @@ SessionStatus Mapper::status() const {
     return status;
   }
   std::map<int, QueueCounts> cameras = queue_->counts();
-  const std::uint64_t rejected_poses = queue_->refusedPoses();
+  const std::uint64_t rejected_poses = queue_->rejectedPoses();
   const std::lock_guard<std::mutex> lock(mutex_);
   SessionStatus status = status_;
   LiveStatus& live = *status.live;
   for (const auto& [camera, counts] : live.cameras) cameras[camera].lost = counts.lost;
   live.cameras = std::move(cameras);
-  live.refused_poses += live_.refused_poses + rejected_poses;
+  live.rejected_poses += live_.rejected_poses + rejected_poses;
   live.errors = live_.errors;
   live.last_error = live_.last_error;
   return status;
@@ -461,7 +461,7 @@ void Mapper::noteError(const char* doing, Fault fault) noexcept {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_input) ++live_.errors;
-    if (fault == Fault::kPose) ++live_.refused_poses;
+    if (fault == Fault::kPose) ++live_.rejected_poses;
   }
   try {
     const std::string text = errorText();
@@ -493,7 +493,8 @@ void Mapper::warnOfLosses() {
   for (const auto& [camera, counts] : status.live->cameras) {
     losses += counts.losses();
     text += fmt::format("; camera {}: ", camera);
-    for (const EventFate fate : {EventFate::kQueueFull, EventFate::kThinned, EventFate::kRefused}) {
+    for (const EventFate fate :
+         {EventFate::kQueueFull, EventFate::kSubsampled, EventFate::kRejected}) {
       text += fmt::format("{} {}, ", counts.fates[fate], rowOf(fate).text);
     }
     text += fmt::format("{} lost afterwards, of {} events", counts.lost, counts.received);

@@ -57,7 +57,7 @@ void MappingSession::addEvents(EventPacket packet) {
     const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
     packets = rig_.add(std::move(packet), mapper_);
   } catch (...) {
-    status_.refused_events[camera] += events;
+    status_.rejected_events[camera] += events;
     throw;
   }
   // If a packet is rejected, the others are used all the same.
@@ -70,7 +70,7 @@ void MappingSession::addEvents(EventPacket packet) {
       older_ns = guard_.admit(mapper_, ready);
       feed(std::move(ready));
     } catch (...) {  // contradicts its camera, or no memory
-      status_.refused_events[ready_camera] += complete - mapper_.readEvents();
+      status_.rejected_events[ready_camera] += complete - mapper_.readEvents();
       if (!rejection) rejection = std::current_exception();
       if (older_ns) guard_.noteOlder(ready_camera, *older_ns);
       if (!rig_.isComplete()) beginClock();  // with a complete rig, `next` does this
@@ -88,7 +88,7 @@ void MappingSession::feed(EventPacket packet) {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
     mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
   }
-  if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
+  if (packet.covered_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.covered_until_ns);
   if (empty) {
     if (!packet.covered_until_ns) return;
     guard_.dropMissing(mapper_, packet.camera, trajectoryTime(*packet.covered_until_ns, offset_ns));
@@ -248,14 +248,14 @@ void MappingSession::finishMapper() {
   if (!finished_ || guard_.clockWentBack()) return;
   if (!guard_.jumped()) return mapper_.finish();
   const auto cameras = static_cast<int>(mapper_.rig().cameras.size());
-  for (int camera = 0; camera < cameras; ++camera) mapper_.coverUntil(camera, kMaxTimeNs);
+  for (int camera = 0; camera < cameras; ++camera) mapper_.setCompleteUntil(camera, kMaxTimeNs);
 }
 
 void MappingSession::finish() {
   finished_ = true;
   guard_.dropAllMissing(mapper_);
   for (const auto& [camera, events] : rig_.waitingEvents()) {
-    status_.refused_events[camera] += events;
+    status_.rejected_events[camera] += events;
   }
   std::exception_ptr error;
   try {
@@ -428,7 +428,7 @@ SessionStatus MappingSession::status() const {
   status.held_events = heldEvents();
   status.counts = earlier_counts_;
   status.counts += mapper_.counts();
-  status.live = guard_.status(status.refused_events, status.counts, options_.mapper.cameras);
+  status.live = guard_.status(status.rejected_events, status.counts, options_.mapper.cameras);
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();

@@ -73,7 +73,7 @@ std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
           "(--hand-eye), after the hand-eye transform that there may be",
           axesText(finding.R_body_rig), matrixText(finding.R_body_rig));
     case PoseMistake::kTimeShift:
-      return fmt::format("with the poses {:.3f} s {}; --set rig.time_offsets_s={} mends it{}",
+      return fmt::format("with the poses {:.3f} s {}; --set rig.time_offsets_s={} fixes it{}",
                          std::abs(finding.shift_s), finding.shift_s < 0 ? "later" : "earlier",
                          offsetsText(rig, finding.shift_s),
                          rig.cameras.size() > 1 ? "" : ", to some 30 ms: one camera tells no more");

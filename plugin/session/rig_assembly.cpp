@@ -141,7 +141,7 @@ void RigAssembly::addCamera(const RigCamera& camera, FusionMapper& mapper) {
 void RigAssembly::letWait(EventPacket packet) {
   constexpr std::int64_t kMaxWaitNs = kNanosecondsPerSecond;
   const int camera = packet.camera;
-  if (complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
+  if (complete_ && waiting_.count(camera) != 0) rejectWithoutNext(camera);
   requireIncomplete(camera);
   packet.calibration.validate();
   const auto waiting = waiting_.find(camera);
@@ -151,14 +151,14 @@ void RigAssembly::letWait(EventPacket packet) {
         std::clamp(packet.events.front().t_ns, -kEndOfTimeNs, kEndOfTimeNs);  // not yet checked
     const std::int64_t begin_ns = first_ns + packet.calibration.time_offset_ns;
     if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
-    if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
+    if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) rejectWithoutNext(camera);
   } else if (waiting != waiting_.end()) {
     return;  // the first packet has the calibration
   }
   waiting_[camera].push_back(std::move(packet));
 }
 
-void RigAssembly::refuseWithoutNext(int camera) const {
+void RigAssembly::rejectWithoutNext(int camera) const {
   throw std::invalid_argument(fmt::format(
       "the recording has events of camera {} but none of camera {}", camera, num_cameras_));
 }
@@ -194,7 +194,7 @@ std::map<int, std::uint64_t> RigAssembly::waitingEvents() const {
 }
 
 void RigAssembly::requireNoneWaits() const {
-  if (!waiting_.empty()) refuseWithoutNext(waiting_.begin()->first);
+  if (!waiting_.empty()) rejectWithoutNext(waiting_.begin()->first);
 }
 
 }  // namespace efm

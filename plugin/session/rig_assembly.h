@@ -64,7 +64,7 @@ class RigAssembly {
   void noteAnnouncement(const EventPacket& packet);
   void addCamera(const RigCamera& camera, FusionMapper& mapper);
   void letWait(EventPacket packet);
-  [[noreturn]] void refuseWithoutNext(int camera) const;
+  [[noreturn]] void rejectWithoutNext(int camera) const;
   void requireIncomplete(int camera) const;
 
   std::vector<int> selected_cameras_;

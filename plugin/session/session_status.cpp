@@ -48,7 +48,7 @@ std::string durationText(double seconds) {
 }
 
 std::string asText(const DroppedWindows& windows) {
-  std::string text = fmt::format("{} windows given up", windows.total());
+  std::string text = fmt::format("{} windows dropped", windows.total());
   const char* separator = ": ";
   for (const DropReasonRow& row : kDropReasons) {
     const std::uint64_t count = windows[row.reason];

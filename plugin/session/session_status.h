@@ -131,7 +131,7 @@ struct QueueCounts {
   std::uint64_t received = 0;
   std::uint64_t held = 0;  ///< Waiting for the end of their 10 ms, or for a confirming event.
   std::uint64_t queued = 0;
-  std::uint64_t taken = 0;  ///< Taken by the mapping: `EventCounts::read`, or `refused_events`.
+  std::uint64_t taken = 0;  ///< Taken by the mapping: `EventCounts::read`, or `rejected_events`.
   /// Part of `taken`: rejected, or lost by fate. Not counted for a camera that takes no part.
   std::uint64_t lost = 0;
   EventFates fates;  ///< Fates in the queue.
@@ -145,11 +145,11 @@ std::string asText(const DroppedWindows& windows);
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
-  std::uint64_t pose_jumps = 0;   ///< Tracker jumps; each begins a new segment of poses.
-  std::uint64_t clock_steps = 0;  ///< Clock resets; each starts the mapping again.
+  std::uint64_t pose_jumps = 0;    ///< Tracker jumps; each begins a new segment of poses.
+  std::uint64_t clock_resets = 0;  ///< Clock resets; each starts the mapping again.
   /// Rejected poses: over a second older than the newest one; ahead of the poses before and after;
   /// not valid; or after the end.
-  std::uint64_t refused_poses = 0;
+  std::uint64_t rejected_poses = 0;
   std::uint64_t errors = 0;  ///< Errors of the mapping and callbacks; see `RefinementState`, too.
   std::string last_error;    ///< Last error, also of rejected samples; empty: none.
   std::string too_large;     ///< Reason why the queue cannot hold a window; empty: it can.
@@ -163,7 +163,7 @@ struct SessionStatus {
   MapperCounts counts;  ///< Complete after `finish`.
   StageTimes times;     ///< Stages within the session; the caller fills in the others.
   /// Events of rejected packets in live operation, by camera. In playback a rejection is an error.
-  std::map<int, std::uint64_t> refused_events;
+  std::map<int, std::uint64_t> rejected_events;
   /// Events that came while map updating was disabled, in playback, by camera.
   std::map<int, std::uint64_t> paused_events;
   std::uint64_t held_events = 0;  ///< Events that windows may still need.

@@ -109,15 +109,15 @@ void addLosses(const SessionStatus& status, Warnings& warnings) {
   if (!status.live) return;
   const DroppedWindows& dropped = status.counts.dropped_windows;
   if (status.live->dropRatio() > 0 || dropped.total() > 0) {
-    std::uint64_t thinned = 0;
+    std::uint64_t subsampled = 0;
     bool overload = dropped[DropReason::kOverload] > 0;
     for (const auto& [index, camera] : status.live->cameras) {
       overload = overload || camera.fates[EventFate::kQueueFull] > 0;
-      thinned += camera.fates[EventFate::kThinned];
+      subsampled += camera.fates[EventFate::kSubsampled];
     }
     std::string why;
-    if (thinned > 0) {
-      why += fmt::format("; {} events were more than [live] max_event_rate lets pass", thinned);
+    if (subsampled > 0) {
+      why += fmt::format("; {} events were more than [live] max_event_rate lets pass", subsampled);
     }
     if (overload) why += "; the machine is too slow for more ([live] max_queue_events)";
     if (!status.live->too_large.empty()) why += "; " + status.live->too_large;
@@ -146,7 +146,7 @@ void addKeyframes(const SessionStatus& status, Warnings& warnings) {
   }
   if (status.refinement && status.refinement->counts.failed_solves > 0) {
     addWarning(warnings, "failed-solves",
-               "{} minima of the refinement could not be computed: poses stayed as they were",
+               "{} failed solves of the refinement: poses stayed as they were",
                status.refinement->counts.failed_solves);
   }
   if (counts.keyframes == 0) return;

@@ -218,14 +218,14 @@ void printCounts(const SessionStatus& status) {
     const std::uint64_t before = queue.held + queue.queued + queue.fates.total();
     fmt::print(
         "camera {}: received {}, thinned {}, dropped {}, used {}, without pose {}, the sums {}\n",
-        camera, queue.received, queue.fates[EventFate::kThinned],
+        camera, queue.received, queue.fates[EventFate::kSubsampled],
         queue.fates[EventFate::kQueueFull], counts[EventFate::kUsed],
         counts[EventFate::kWithoutPose],
         queue.received == before + queue.taken ? "agree" : "DIFFER");
   }
   fmt::print("{} keyframes, {}, {} jumps, {} clock resets, {} errors {}; drop ratio {:.3f}\n",
              status.counts.keyframes, asText(status.counts.dropped_windows),
-             status.live->pose_jumps, status.live->clock_steps, status.live->errors,
+             status.live->pose_jumps, status.live->clock_resets, status.live->errors,
              status.live->last_error, status.live->dropRatio());
 }
 

@@ -36,7 +36,7 @@ std::int64_t readStreams(const std::string& path, const std::int64_t* seek_ns) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const efm::fuzz::MemoryFile file(kBegin, data, size);
   std::int64_t middle_ns = 0;
-  efm::fuzz::readOrRefuse(file.path(), [&] { middle_ns = readStreams(file.path(), nullptr); });
-  efm::fuzz::readOrRefuse(file.path(), [&] { readStreams(file.path(), &middle_ns); });
+  efm::fuzz::readOrReject(file.path(), [&] { middle_ns = readStreams(file.path(), nullptr); });
+  efm::fuzz::readOrReject(file.path(), [&] { readStreams(file.path(), &middle_ns); });
   return 0;
 }

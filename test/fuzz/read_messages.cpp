@@ -68,7 +68,7 @@ void decodeAll(Messages& bag, efm::RosType type) {
   efm::BagMessage message;
   while (cursor(message)) {
     // The caller of the decoders knows the file's name.
-    efm::fuzz::readOrRefuse("", [&] {
+    efm::fuzz::readOrReject("", [&] {
       if (efm::hasPoses(type)) {
         efm::decodePose(message, type);
       } else {
@@ -90,10 +90,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   std::int64_t middle_ns = 0;
-  efm::fuzz::readOrRefuse(kName, [&] {
+  efm::fuzz::readOrReject(kName, [&] {
     middle_ns = efm::fuzz::readStream(*efm::openBagEvents({{{bag, 0}}}).front());
   });
-  efm::fuzz::readOrRefuse(kName, [&] {
+  efm::fuzz::readOrReject(kName, [&] {
     const auto cameras = efm::openBagEvents({{{bag, 0}}});
     cameras.front()->seek(middle_ns);
     efm::fuzz::readStream(*cameras.front());

@@ -43,25 +43,25 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const efm::fuzz::MemoryFile file({}, data, size);
   const std::string path = file.path();
   if (efm::isCompressed(path)) {
-    efm::fuzz::readOrRefuse(path, [&] {
+    efm::fuzz::readOrReject(path, [&] {
       for (const std::string& member : efm::membersOf(path)) {
-        efm::fuzz::readOrRefuse(
+        efm::fuzz::readOrReject(
             path, [&] { readNumbers(std::make_shared<efm::NpyArray>(path, member), 0); });
       }
     });
   } else {
-    efm::fuzz::readOrRefuse(path, [&] {
+    efm::fuzz::readOrReject(path, [&] {
       const auto array = std::make_shared<efm::NpyArray>(path);
       readNumbers(array, 0);
       readNumbers(array, array->size() / 2);
     });
   }
-  efm::fuzz::readOrRefuse(path, [&] { efm::readPoseArrays(path, {}); });
+  efm::fuzz::readOrReject(path, [&] { efm::readPoseArrays(path, {}); });
   for (const char* columns : {"", "t=a x=b y=c p=d", "x y - p t"}) {
     efm::ReaderOptions options;
     options.columns = columns;
     options.time_unit = "us";
-    efm::fuzz::readOrRefuse(path, [&] {
+    efm::fuzz::readOrReject(path, [&] {
       const auto camera = std::move(efm::openEventArrays({path}, options).cameras.at(0));
       camera->seek(1'000'000'000);
       std::vector<efm::Event> events;

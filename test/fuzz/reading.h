@@ -55,7 +55,7 @@ inline std::int64_t readStream(EventStream& stream) {
 
 /// Calls `read`. It may reject a file with an error that names the file.
 template <typename Read>
-void readOrRefuse(const std::string& file, const Read& read) {
+void readOrReject(const std::string& file, const Read& read) {
   try {
     read();
   } catch (const std::runtime_error& error) {

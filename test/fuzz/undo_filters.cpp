@@ -18,8 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t bytes = 1 + data[2] + data[3] * std::size_t{256};
   std::vector<std::uint8_t> chunk(data + kHeaderBytes, data + size);
   std::vector<std::uint8_t> scratch;
-  const auto refused = efm::undoFilters(kFilters[data[0] % kFilters.size()], 0, element_bytes,
-                                        bytes, chunk, scratch);
-  if (!refused && chunk.size() != bytes) std::abort();
+  const auto rejected = efm::undoFilters(kFilters[data[0] % kFilters.size()], 0, element_bytes,
+                                         bytes, chunk, scratch);
+  if (!rejected && chunk.size() != bytes) std::abort();
   return 0;
 }

@@ -109,7 +109,7 @@ Poses withoutJumps(const Poses& poses) {
   return kept;
 }
 
-void refuseGaps(const Poses& poses) {
+void rejectGaps(const Poses& poses) {
   constexpr double kMaxGapS = 1;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const double gap_s = secondsBetween(poses[i - 1].t_ns, poses[i].t_ns);
@@ -208,7 +208,7 @@ Poses filtered(const Poses& poses, const std::vector<double>& weights) {
 std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses) {
   constexpr std::int64_t kPeriodNs = 5'000'000;
   const Poses clean = withoutJumps(inOrder(poses));
-  refuseGaps(clean);
+  rejectGaps(clean);
   // Above half of the poses' rate there are only artefacts of interpolation.
   const double cutoff_hz = std::min(10.0, 0.4 / medianPeriod(clean));
   return filtered(resampled(clean, kPeriodNs), lowPass(cutoff_hz, secondsBetween(0, kPeriodNs)));

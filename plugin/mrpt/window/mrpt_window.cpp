@@ -46,7 +46,7 @@ class MrptWindow : public MapWindow {
 
   bool due(bool is_last) override {
     if (!window_.isOpen()) {
-      if (!std::exchange(told_, true)) {
+      if (!std::exchange(reported_, true)) {
         std::cerr << "event-fusion: the window was closed; the mapping goes on\n";
       }
       return false;
@@ -118,8 +118,8 @@ class MrptWindow : public MapWindow {
   MapScene scene_;
   std::optional<std::array<float, 3>> placed_;  // the view that was set last
   Clock::time_point asked_, next_;
-  bool told_ = false;  // the user knows that the window was closed
-  std::mutex mutex_;   // protects the members below
+  bool reported_ = false;  // the user knows that the window was closed
+  std::mutex mutex_;       // protects the members below
   std::condition_variable changed_;
   std::optional<WatchedMap> waiting_;
   bool stop_ = false;

@@ -35,7 +35,7 @@ bool isCompressedBag(const fs::path& file) {
   return (inner == ".db3" || inner == ".mcap") && beginsWith(file, kZstdStart);
 }
 
-[[noreturn]] void refuseCompressed(const fs::path& file) {
+[[noreturn]] void rejectCompressed(const fs::path& file) {
   throw std::runtime_error(fmt::format(
       "{}: a compressed bag: expected an uncompressed one, by `zstd -d` (files) or `ros2 bag "
       "convert` (messages)",
@@ -43,7 +43,7 @@ bool isCompressedBag(const fs::path& file) {
 }
 
 std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
-  if (isCompressedBag(file)) refuseCompressed(file);
+  if (isCompressedBag(file)) rejectCompressed(file);
   const bool ros1 = looksLikeRosbag(file);
 #ifdef EFM_WITH_ROSBAG
   if (ros1) return openRos1Bag(file);
@@ -77,7 +77,7 @@ std::vector<fs::path> filesOfMetadata(const fs::path& metadata) {
     throw std::runtime_error(fmt::format("{}: {}: expected the metadata of a ROS 2 bag",
                                          metadata.string(), error.what()));
   }
-  if (!compression.empty() && compression != "NONE") refuseCompressed(metadata);
+  if (!compression.empty() && compression != "NONE") rejectCompressed(metadata);
   if (files.empty()) {
     throw std::runtime_error(
         fmt::format("{}: relative_file_paths is missing or empty: expected the bag's files",

@@ -91,7 +91,7 @@ std::size_t indexOf(const std::string& name, const std::vector<std::string>& all
   return static_cast<std::size_t>(std::find(all.begin(), all.end(), name) - all.begin());
 }
 
-[[noreturn]] void refuse(const fs::path& file, const std::vector<FoundArray>& arrays,
+[[noreturn]] void reject(const fs::path& file, const std::vector<FoundArray>& arrays,
                          const ReaderOptions& options) {
   std::string all;
   for (const FoundArray& array : arrays) {
@@ -144,7 +144,7 @@ EventTable fieldsOf(const fs::path& file, const FoundArray& found, const ReaderO
   std::vector<std::string> all;
   for (const NpyField& field : found.header.fields) all.push_back(field.name);
   const std::optional<EventNames> names = namesOf(all, options);
-  if (!names) refuse(file, {found}, options);
+  if (!names) reject(file, {found}, options);
   const auto array = std::make_shared<NpyArray>(file, found.member, NpyPart{true, {}, false});
   EventTable table = tableOf(*names, [&](const std::string& name) {
     return NpyArray::columnOf(array, indexOf(name, all));
@@ -215,7 +215,7 @@ EventTable eventColumnsOf(const fs::path& file, const ReaderOptions& options) {
   for (const FoundArray& array : arrays) {
     if (hasEvents(array.header, columnsOf(options))) with_events.push_back(array);
   }
-  if (with_events.size() != 1) refuse(file, arrays, options);
+  if (with_events.size() != 1) reject(file, arrays, options);
   const FoundArray& found = with_events.front();
   return found.header.structured ? fieldsOf(file, found, options)
                                  : matrixColumnsOf(file, found, options);

@@ -17,7 +17,7 @@ constexpr std::int64_t kMillisecondNs = 1'000'000;
 constexpr std::int64_t kMaxPixel = std::numeric_limits<std::uint16_t>::max();
 
 /// The first wrong number of a block.
-struct RefusedNumber {
+struct RejectedNumber {
   std::size_t event;
   char column;
 };
@@ -105,15 +105,15 @@ class TableEvents : public EventStream {
     const auto count = static_cast<std::size_t>(end - next_);
     const std::size_t before = events.size();
     events.resize(before + count);
-    std::optional<RefusedNumber> refused;
+    std::optional<RejectedNumber> rejected;
     for (const char letter : order()) {
       const std::size_t valid =
           setColumn(letter, column(letter).from(next_), count, events.data() + before);
-      if (valid < count && (!refused || valid < refused->event)) refused = {valid, letter};
+      if (valid < count && (!rejected || valid < rejected->event)) rejected = {valid, letter};
     }
-    if (refused) {
-      events.resize(before + refused->event);
-      throw failure(next_ + refused->event, refused->column);
+    if (rejected) {
+      events.resize(before + rejected->event);
+      throw failure(next_ + rejected->event, rejected->column);
     }
     next_ = end;
   }

@@ -306,7 +306,7 @@ bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts&
   return any;
 }
 
-[[noreturn]] void refuse(const fs::path& path) {
+[[noreturn]] void reject(const fs::path& path) {
   std::string expected;
   for (const Hdf5Layout& layout : hdf5Layouts()) {
     expected += fmt::format("{}{} ({}), ", layout.cameras.front(), layout.signature(), layout.name);
@@ -333,7 +333,7 @@ void addFolder(const fs::path& folder, const ReaderOptions& options, RecordingPa
                       file.string(), other->second.string()));
     }
   }
-  if (!any) refuse(folder);
+  if (!any) reject(folder);
   addFolderFiles(folder, options, parts);
 }
 
@@ -344,7 +344,7 @@ RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOption
   for (const fs::path& source : sources) {
     std::error_code ignored;
     if (!fs::is_directory(source, ignored)) {
-      if (!addFile(source, options, parts)) refuse(source);
+      if (!addFile(source, options, parts)) reject(source);
       continue;
     }
     addFolder(source, options, parts);

@@ -32,7 +32,7 @@ const RecordingFormat* formatNamed(const std::string& name) {
   throw std::runtime_error("'" + name + "' is not a known format");
 }
 
-[[noreturn]] void refuseUnknown(const Path& path) {
+[[noreturn]] void rejectUnknown(const Path& path) {
   std::string expected = "a rawlog file";
   for (const RecordingFormat& format : readerFormats()) expected += ", " + format.description;
   throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
@@ -68,7 +68,7 @@ const RecordingFormat* formatOf(const Path& path, const RecordingSource& source)
   if (const auto unread = unreadFormat(path)) {
     throw std::runtime_error(fmt::format("{}: {} (docs/recordings.md)", path.string(), *unread));
   }
-  if (!isFile(path)) refuseUnknown(path);
+  if (!isFile(path)) rejectUnknown(path);
   return isRawlog(path) ? &rawlogFormat() : nullptr;
 }
 
@@ -117,7 +117,7 @@ bool isPoses(const Path& path) {
 }
 
 /// Throws an error: the kind of a file that is no recording, or the best-fitting reader's problem.
-[[noreturn]] void refuse(const Path& path) {
+[[noreturn]] void reject(const Path& path) {
   const std::string name = path.string();
   if (path.extension() == ".ini" && !isCalibration(path)) {
     throw std::runtime_error(name +
@@ -189,7 +189,7 @@ RecordingParts openParts(const RecordingSource& source) {
   RecordingParts all;
   for (std::size_t i = 0; i < source.files.size();) {
     const RecordingFormat* const format = formatOf(source.files[i], source);
-    if (format == nullptr) refuse(source.files[i]);
+    if (format == nullptr) reject(source.files[i]);
     if (format == &rawlogFormat() && source.files.size() > 1) {
       throw std::runtime_error(source.files[i].string() +
                                ": a rawlog beside other sources: expected it alone");
@@ -228,12 +228,12 @@ std::optional<CameraSize> knownSizeOf(const RecordingParts& parts, std::size_t c
 std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
                                  const Calibration* given, const RecordingSource& source) {
   const std::optional<CameraSize> known = knownSizeOf(parts, camera, given);
-  const std::optional<CameraSize>& told = source.reader.sensor_size;
-  if (!known) return told ? told : parts.default_size;
-  if (told && (told->width != known->width || told->height != known->height)) {
-    throw std::runtime_error(fmt::format("--sensor-size {}x{}: {} has {}x{} pixels", told->width,
-                                         told->height, parts.cameras[camera]->name(), known->width,
-                                         known->height));
+  const std::optional<CameraSize>& given_size = source.reader.sensor_size;
+  if (!known) return given_size ? given_size : parts.default_size;
+  if (given_size && (given_size->width != known->width || given_size->height != known->height)) {
+    throw std::runtime_error(fmt::format(
+        "--sensor-size {}x{}: {} has {}x{} pixels", given_size->width, given_size->height,
+        parts.cameras[camera]->name(), known->width, known->height));
   }
   return known;
 }

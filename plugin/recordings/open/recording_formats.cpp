@@ -219,7 +219,7 @@ bool beginsAnObject(std::string_view bytes) {
   return std::all_of(name.begin(), name.end(), isNameCharacter);
 }
 
-void refuseUnread(const fs::path& file) {
+void rejectUnread(const fs::path& file) {
   if (isCompressed(file) || fs::is_directory(file)) return;
   if (const auto unread = unreadFormat(file)) {
     throw std::runtime_error(file.string() + ": " + *unread);
@@ -229,7 +229,7 @@ void refuseUnread(const fs::path& file) {
 std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions options) {
   const RecordingFormat* const format = detectFormat(file);
   if (format == nullptr) {
-    refuseUnread(file);
+    rejectUnread(file);
     throw std::runtime_error(file.string() +
                              ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
                              "columns with a header), NumPy arrays, or a recording with poses");
@@ -250,7 +250,7 @@ std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions&
   requireTextLines(start, file.string());
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
-  refuseUnread(file);
+  rejectUnread(file);
   return readPoseText(file, options);
 }
 

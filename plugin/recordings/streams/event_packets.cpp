@@ -166,7 +166,7 @@ void EventPackets::takeBlock() {
     if (ahead_) settleAhead(event.t_ns);
     if (ended_) return;  // errors after this time do not matter
     if (!isGood(event)) {
-      refuse(problemOf(i));
+      reject(problemOf(i));
     } else if (event.t_ns - newest_ns_ <= kFarAheadNs || newest_ns_ == -kEndOfTimeNs) {
       take(event);
     } else {
@@ -174,11 +174,11 @@ void EventPackets::takeBlock() {
       ahead_problem_ = problemOf(i);
     }
   }
-  refuseEqualTimes();
+  rejectEqualTimes();
 }
 
 /// Counts in whole blocks, which costs nothing: too many events of one time fill several blocks.
-void EventPackets::refuseEqualTimes() {
+void EventPackets::rejectEqualTimes() {
   constexpr std::int64_t kMaxPixels = std::int64_t{1} << 21;  // if the sensor is unknown
   const auto pixels = std::min(kMaxPixels, std::int64_t{1} * size_.width * size_.height);
   const bool equal = !block_.empty() && block_.front().t_ns == block_.back().t_ns &&
@@ -195,12 +195,12 @@ void EventPackets::refuseEqualTimes() {
 void EventPackets::settleAhead(std::int64_t next_ns) {
   const Event ahead = *std::exchange(ahead_, std::nullopt);
   const bool back = next_ns < ahead.t_ns - kMaxEventDelayNs;
-  if (back && next_ns >= newest_ns_ - kMaxEventDelayNs) return refuse(ahead_problem_);
+  if (back && next_ns >= newest_ns_ - kMaxEventDelayNs) return reject(ahead_problem_);
   take(ahead);
 }
 
 /// Leaves out a wrong event, or throws its error if wrong events are not allowed.
-void EventPackets::refuse(const std::string& problem) {
+void EventPackets::reject(const std::string& problem) {
   if (bad_ == nullptr) throw std::runtime_error(problem);
   bad_->skip(problem);
 }

@@ -65,8 +65,8 @@ class EventPackets {
   void takeBlock();
   void take(const Event& event);
   void settleAhead(std::int64_t next_ns);
-  void refuseEqualTimes();
-  void refuse(const std::string& problem);
+  void rejectEqualTimes();
+  void reject(const std::string& problem);
   bool isGood(const Event& event) const;
   std::string problemOf(std::size_t i) const;
 

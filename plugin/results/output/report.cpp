@@ -154,8 +154,8 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
           {"windows_given_up_for", asJson(counts.dropped_windows)},
           {"late_events", counts.late_events},
           {"pose_jumps", live.pose_jumps},
-          {"clock_steps", live.clock_steps},
-          {"refused_poses", live.refused_poses},
+          {"clock_steps", live.clock_resets},
+          {"refused_poses", live.rejected_poses},
           {"errors", live.errors},
           {"last_error", live.last_error}};
 }

@@ -93,7 +93,7 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// this process), reference_view and baseline_m if known, stopped_at if the run was interrupted
 /// (the fraction of the recording that was mapped), live in live operation (drop_ratio; counts of
 /// each camera's events before the mapping; windows_given_up and the reasons; late_events,
-/// pose_jumps, clock_steps, refused_poses, errors and last_error), warnings (each with name and
+/// pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each with name and
 /// text), doubtful (reasons why the map has little evidence; absent if there are none), recording
 /// (the files), perturbation (the faults of the poses, if any), chosen (the automatic options: key,
 /// value and reason), options (all options with the used values) and version. Bytes of names that

@@ -111,7 +111,7 @@ PagePoints::PagePoints(const MapCloud& cloud, double voxel_size_m, std::size_t l
       cell_m *= std::sqrt(ratio);
     }
     while (!thin(cell_m)) cell_m *= 1.03;
-    thinned_m_ = cell_m;
+    subsampled_m_ = cell_m;
   }
   stride_ = longStride(size());
 }
@@ -270,7 +270,7 @@ Json describe(const MapPage& page, const PagePoints& points) {
       {"name", page.name},
       {"points", points.size()},
       {"all_points", page.points.size()},
-      {"thinned_m", points.thinned_m()},
+      {"thinned_m", points.subsampled_m()},
       {"voxel_m", page.voxel_size_m},
       {"origin_m", asJson(points.origin_m())},
       {"step_m", asJson(points.step_m())},

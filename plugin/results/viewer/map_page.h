@@ -60,7 +60,7 @@ class PagePoints {
   PagePoint at(std::size_t i) const;
 
   /// Returns the edge of the grid's cells in metres, 0 if points were not subsampled.
-  double thinned_m() const { return thinned_m_; }
+  double subsampled_m() const { return subsampled_m_; }
   /// Returns the smallest coordinates, frame `world`, metres.
   const Eigen::Vector3d& origin_m() const { return origin_m_; }
   /// Returns the resolution of positions: the extent / 65535, metres.
@@ -78,7 +78,7 @@ class PagePoints {
   const MapCloud& cloud_;
   std::size_t limit_;
   std::vector<std::uint32_t> kept_;  // indices of points, if the map was subsampled
-  double thinned_m_ = 0;
+  double subsampled_m_ = 0;
   std::size_t stride_ = 1;
   Eigen::Vector3d origin_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d step_m_ = Eigen::Vector3d::Zero();

@@ -96,14 +96,14 @@ TEST(ParseNumber, TakesATextFromEndToEndAlone) {
   }
 }
 
-TEST(ParseNumber, RefusesValuesThatTheTypeCannotHold) {
+TEST(ParseNumber, RejectsValuesThatTheTypeCannotHold) {
   EXPECT_EQ(parseNumber<std::uint32_t>("4294967295"), 4'294'967'295U);
   EXPECT_FALSE(parseNumber<std::uint32_t>("4294967296"));
   EXPECT_FALSE(parseNumber<std::uint32_t>("-1"));
   EXPECT_FALSE(parseNumber<double>("1e999"));
 }
 
-TEST(ParseFinite, RefusesInfinityAndNan) {
+TEST(ParseFinite, RejectsInfinityAndNan) {
   EXPECT_EQ(parseFinite("-2.5"), -2.5);
   for (const char* text : {"inf", "-inf", "nan", "1e999", ""}) EXPECT_FALSE(parseFinite(text));
 }
@@ -125,7 +125,7 @@ TEST(WithoutByteOrderMark, ATextLosesTheMarkAtItsBeginningAlone) {
   EXPECT_EQ(withoutByteOrderMark("\xEF\xBB"), "\xEF\xBB");
 }
 
-TEST(NamedChoice, GoesBothWaysAndRefusesOthers) {
+TEST(NamedChoice, GoesBothWaysAndRejectsOthers) {
   constexpr NamedChoice<int> kChoices[] = {{3, "three"}, {5, "five"}};
   for (const auto& choice : kChoices) {
     EXPECT_EQ(nameIn(kChoices, choice.value), choice.name);

@@ -187,21 +187,21 @@ TEST_F(TiffFiles, AndPngsThatAreCutOrDamagedAreErrorsWithoutAWordOnTheTerminal) 
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(PictureFile, ImagesThatTheirFileCannotHoldAreRefused) {
-  const auto refused = [](const std::string& bytes) {
+TEST(PictureFile, ImagesThatTheirFileCannotHoldAreRejected) {
+  const auto rejected = [](const std::string& bytes) {
     return errorOf([&] { decodePicture(bytes); });
   };
   const cv::Mat1b rows(5, 18, uchar{7});
-  EXPECT_THAT(refused(png(60000, 60000, 16, 0, rows)),
+  EXPECT_THAT(rejected(png(60000, 60000, 16, 0, rows)),
               HasSubstr("60000x60000 pixels in a file of"));
-  EXPECT_THAT(refused(png(6000, 6000, 16, 0, rows)), HasSubstr("6000x6000 pixels in a file of"));
+  EXPECT_THAT(rejected(png(6000, 6000, 16, 0, rows)), HasSubstr("6000x6000 pixels in a file of"));
   std::string tiff = encodeTiff(cv::Mat1f(5, 9, 1.0F));
   for (const std::size_t tag : {0, 1}) {  // the directory of tags follows 180 bytes of pixels
     tiff.replace(8 + 180 + 2 + 12 * tag + 8, 4, std::string("\x70\x17\0\0", 4));
   }
-  EXPECT_THAT(refused(tiff), HasSubstr("6000x6000 pixels in a file of"));
-  EXPECT_THAT(refused("hello"), HasSubstr("'hello': expected a PNG or TIFF"));
-  EXPECT_THAT(refused(""), HasSubstr("it is empty"));
+  EXPECT_THAT(rejected(tiff), HasSubstr("6000x6000 pixels in a file of"));
+  EXPECT_THAT(rejected("hello"), HasSubstr("'hello': expected a PNG or TIFF"));
+  EXPECT_THAT(rejected(""), HasSubstr("it is empty"));
 }
 
 TEST(PictureSize, IsThatOfTheHeader) {

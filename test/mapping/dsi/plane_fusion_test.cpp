@@ -227,7 +227,7 @@ TEST(VotingKernel, TheFastestIsNeverOneThatIsSlowerThanPlain) {
   EXPECT_EQ(fastestOf({K::kPlain, K::kBaseline, K::kNeon}), K::kNeon);
 }
 
-TEST(VotingKernel, TheSweepAcceptsEveryAvailableKernelAndRefusesTheOthersByName) {
+TEST(VotingKernel, TheSweepAcceptsEveryAvailableKernelAndRejectsTheOthersByName) {
   EXPECT_EQ(SpaceSweepOptions().kernelOrFastest(), fastestKernel());
   for (const VotingKernel kernel : kAll) {
     SpaceSweepOptions options;

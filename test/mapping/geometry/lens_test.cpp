@@ -118,7 +118,7 @@ TEST(Camera, AWrongCountOfCoefficientsSaysWhatIsExpected) {
 
 using Change = std::function<void(RigCamera&)>;
 
-TEST(RigCamera, ACalibrationThatIsNoneIsRefusedWithItsValue) {
+TEST(RigCamera, ACalibrationThatIsNoneIsRejectedWithItsValue) {
   const std::vector<std::pair<const char*, Change>> cases = {
       {"fx = 0: must be", [](auto& c) { c.model.fx = 0; }},
       {"T_rig_cam: x = nan: must be", [](auto& c) { c.T_rig_cam.translation.x() = NAN; }},
@@ -378,7 +378,7 @@ TEST(LensInverse, TangentialDistortionIsInvertedOnTheBranchOfTheCentre) {
   }
 }
 
-TEST(LensInverse, ALensThatProjectsNothingToTheSensorIsRefused) {
+TEST(LensInverse, ALensThatProjectsNothingToTheSensorIsRejected) {
   CameraModel model = cameraOf(kLenses[3]);
   model.cx = 2000;
   EXPECT_THAT([&] { UndistortionTable{model}; },

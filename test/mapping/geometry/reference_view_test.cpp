@@ -175,7 +175,7 @@ TEST(Timestamp, DecimalTextIsReadToTheNanosecond) {
   EXPECT_EQ(parseSeconds("12.5"), 12'500'000'000);
 }
 
-TEST(Timestamp, TextThatIsNoNumberOrDoesNotFitIsRefused) {
+TEST(Timestamp, TextThatIsNoNumberOrDoesNotFitIsRejected) {
   for (const char* text : {"",
                            "-",
                            "+",

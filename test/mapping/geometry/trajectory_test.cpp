@@ -63,7 +63,7 @@ TEST(Trajectory, OfTwoPosesAtTheSameTimeTheFirstStays) {
   EXPECT_EQ(trajectory.poseAt(9)->translation.x(), 3);
 }
 
-TEST(Trajectory, InvalidPosesAreRefused) {
+TEST(Trajectory, InvalidPosesAreRejected) {
   const auto with = [](const std::function<void(StampedPose&)>& change) {
     StampedPose pose = at(0, 0);
     change(pose);

@@ -97,7 +97,7 @@ TEST(FusionMapper, NoTimeOverflowsWithTheOffsetOfItsCamera) {
   for (const std::int64_t sign : {-1, 1}) {
     Mapper mapper(period(), 0);
     mapper.addCamera({test::smallCamera(), {}, sign * kEndOfTimeNs});
-    mapper.coverUntil(0, sign * kMaxTimeNs);
+    mapper.setCompleteUntil(0, sign * kMaxTimeNs);
     const std::int64_t farthest_ns = -sign * kEndOfTimeNs;
     mapper.addEvents(0, {eventAt(std::min<std::int64_t>(farthest_ns, 0)),
                          eventAt(std::max<std::int64_t>(farthest_ns, 0))});
@@ -159,7 +159,7 @@ TEST(FusionMapper, WindowsWithoutEventsMakeNoKeyframes) {
   Mapper mapper(left_only, 2);
   mapper.addPoses(0, 3000);
   mapper.addSteady(0, 0, 250);
-  mapper.coverUntil(0, at(3000));
+  mapper.setCompleteUntil(0, at(3000));
   mapper.addSteady(1, 0, 2001);
   EXPECT_EQ(mapper.end().size(), 3U) << "the third one has events in its first half";
   EXPECT_EQ(mapper.counts().windows_without_events, 17U);
@@ -197,20 +197,20 @@ TEST(FusionMapper, InvalidOptionsAreNamed) {
   }
 }
 
-TEST(FusionMapper, InputThatIsNotValidIsRefusedAndNoneOfIt) {
+TEST(FusionMapper, InputThatIsNotValidIsRejectedAndNoneOfIt) {
   Mapper mapper;
   mapper.addEvents(0, {eventAt(20 * kMs), eventAt(10 * kMs)});
-  const auto refused = [&](const std::vector<Event>& events, const auto& message) {
+  const auto rejected = [&](const std::vector<Event>& events, const auto& message) {
     EXPECT_THAT([&] { mapper.addEvents(0, events); },
                 ThrowsMessage<std::invalid_argument>(message));
     EXPECT_EQ(mapper.counts().total().read, 2U);
   };
-  refused({eventAt(20 * kMs), eventAt(2, 48)},
-          AllOf(HasSubstr("(48, 0)"), HasSubstr("48x36"), HasSubstr("0.000000002 s")));
-  refused({Event{20 * kMs, 0, 36, true}}, HasSubstr("(0, 36)"));
-  refused({eventAt(10 * kMs - 1)},
-          AllOf(HasSubstr("event at 0.009999999 s"), HasSubstr("that at 0.020000000 s")));
-  refused({eventAt(40 * kMs), eventAt(30 * kMs - 1)}, HasSubstr("that at 0.040000000 s"));
+  rejected({eventAt(20 * kMs), eventAt(2, 48)},
+           AllOf(HasSubstr("(48, 0)"), HasSubstr("48x36"), HasSubstr("0.000000002 s")));
+  rejected({Event{20 * kMs, 0, 36, true}}, HasSubstr("(0, 36)"));
+  rejected({eventAt(10 * kMs - 1)},
+           AllOf(HasSubstr("event at 0.009999999 s"), HasSubstr("that at 0.020000000 s")));
+  rejected({eventAt(40 * kMs), eventAt(30 * kMs - 1)}, HasSubstr("that at 0.040000000 s"));
 
   mapper.addPoses(5000, 5000);
   mapper.addPoses(4000, 4000);
@@ -343,7 +343,7 @@ TEST(FusionMapper, TheLastWindowIsFullAndEndsWithTheRecording) {
   }
 }
 
-TEST(FusionMapper, TheLastWindowReachesNotIntoEventsThatWereGivenUp) {
+TEST(FusionMapper, TheLastWindowReachesNotIntoEventsThatWereDropped) {
   for (const auto& [until_ms, keyframes] : {std::pair{150, 1U}, std::pair{190, 0U}}) {
     FusionMapperOptions options = period();
     options.fill_last_window = true;

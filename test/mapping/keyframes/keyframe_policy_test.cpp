@@ -74,7 +74,7 @@ TEST(KeyframePolicy, ForwardLookingVehiclesReferToTheEnd) {
   EXPECT_EQ(policy->current(startingAt(0))->t_ref_ns, 500'000'000);
 }
 
-TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
+TEST(KeyframePolicy, WindowsThatAreDroppedPieceByPieceCountOnce) {
   constexpr std::int64_t kMs = 1'000'000;
   KeyframePolicyOptions options = period(0.1, 0.1);
   options.window_events = 100;
@@ -99,7 +99,7 @@ TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
   }
 }
 
-TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrGivenUp) {
+TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrDropped) {
   const Recording recording = startingAt(kStart_ns);
   for (const std::int64_t t_ref_ns : {5, 15}) {
     const Window window{10, 20, t_ref_ns};

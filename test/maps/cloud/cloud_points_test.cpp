@@ -145,7 +145,7 @@ TEST(RemoveOutliers, AFarOutlierDoesNotReduceThePrecisionOfTheOthers) {
   EXPECT_EQ(removeOutliers(points, {}).size(), points.size()) << "radius 0";
 }
 
-TEST(RemoveOutliers, PointsThatAreNotFiniteAreRefused) {
+TEST(RemoveOutliers, PointsThatAreNotFiniteAreRejected) {
   // The square of 1e18 is a float's, that of 1e20 is not.
   for (const double wrong : {std::nan(""), 1.0 * INFINITY, 1e18, -1e30}) {
     EXPECT_THROW(removeOutliers(onALine({0, 0, wrong}), {1, 1}), std::invalid_argument) << wrong;

@@ -142,7 +142,7 @@ TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoint
   EXPECT_EQ(points[1].support, 1U);
 }
 
-TEST(GlobalCloud, ARefusedKeyframeLeavesNothingBehind) {
+TEST(GlobalCloud, ARejectedKeyframeLeavesNothingBehind) {
   const double limit = std::ldexp(1, 60);  // of indices of 64 bits, where a voxel has 1/8 m
   const double above = std::nextafter(limit, INFINITY);
   const double below = std::nextafter(limit, 0);
@@ -339,38 +339,38 @@ TEST(MapConsistency, PointsOnATrueSurfaceAreNeverExcluded) {
   }
 }
 
-TEST(MapConsistency, SettledKeyframesMakeTheSameMapBitForBit) {
+TEST(MapConsistency, FinalizedKeyframesMakeTheSameMapBitForBit) {
   std::mt19937 random(7);
   const std::vector<View> views = viewsWithOutliers(random, 40);
   for (const Consistency consistency :
        {Consistency::kNone, Consistency::kSupport, Consistency::kVisibility}) {
     GlobalCloud kept(withConsistency(consistency));
-    GlobalCloud settled(withConsistency(consistency));
+    GlobalCloud finalized(withConsistency(consistency));
     for (std::uint64_t k = 0; k < views.size(); ++k) {
       kept.insert(k, views[k].points, views[k].T_world_ref);
-      settled.insert(k, views[k].points, views[k].T_world_ref);
+      finalized.insert(k, views[k].points, views[k].T_world_ref);
       // At any time, one keyframe or several at once.
       if (k >= GlobalCloud::kMaxNumberDifference && random() % 3 == 0) {
-        settled.settle(k - GlobalCloud::kMaxNumberDifference);
+        finalized.finalize(k - GlobalCloud::kMaxNumberDifference);
       }
       if (k % 10 != 9) continue;
       for (const int min_keyframes : {1, 3}) {
-        EXPECT_TRUE(test::sameBits(*settled.points(min_keyframes), *kept.points(min_keyframes)));
+        EXPECT_TRUE(test::sameBits(*finalized.points(min_keyframes), *kept.points(min_keyframes)));
       }
     }
-    EXPECT_EQ(settled.keyframes(), kept.keyframes());
-    EXPECT_GT(settled.settledVoxels(), 0U);
-    EXPECT_LT(settled.unsettledVoxels(kAll), kept.unsettledVoxels(kAll) / 2);
-    EXPECT_EQ(settled.unsettledVoxels(0), 0U);
-    settled.settle(31);  // the limits of what may change from now on
-    settled.settle(5);   // which do not become wider again
-    EXPECT_THROW(settled.insert(38, {}), std::invalid_argument);
-    EXPECT_THROW(settled.remove(30), std::invalid_argument);
-    EXPECT_THROW(settled.replace(30, {}, {}), std::invalid_argument);
-    EXPECT_EQ(settled.keyframes(), 40U);
-    settled.remove(39);
+    EXPECT_EQ(finalized.keyframes(), kept.keyframes());
+    EXPECT_GT(finalized.finalizedVoxels(), 0U);
+    EXPECT_LT(finalized.unfinalizedVoxels(kAll), kept.unfinalizedVoxels(kAll) / 2);
+    EXPECT_EQ(finalized.unfinalizedVoxels(0), 0U);
+    finalized.finalize(31);  // the limits of what may change from now on
+    finalized.finalize(5);   // which do not become wider again
+    EXPECT_THROW(finalized.insert(38, {}), std::invalid_argument);
+    EXPECT_THROW(finalized.remove(30), std::invalid_argument);
+    EXPECT_THROW(finalized.replace(30, {}, {}), std::invalid_argument);
+    EXPECT_EQ(finalized.keyframes(), 40U);
+    finalized.remove(39);
     kept.remove(39);
-    EXPECT_TRUE(test::sameBits(*settled.points(), *kept.points()));
+    EXPECT_TRUE(test::sameBits(*finalized.points(), *kept.points()));
   }
 }
 

@@ -76,7 +76,7 @@ TEST(KeyframeCloud, LateFusionIsThePointsOfOneCameraAfterTheOther) {
   EXPECT_EQ(points[1].p_ref, Eigen::Vector3f(1.5F, 1.5F, 3));
 }
 
-TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRefused) {
+TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRejected) {
   for (cv::Mat1f DepthMap::*image :
        {&DepthMap::depth, &DepthMap::confidence, &DepthMap::variance}) {
     KeyframeDepthMap keyframe = smallKeyframe();
@@ -222,7 +222,7 @@ TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3, 4}));
 }
 
-TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
+TEST(RefinedCloud, RejectsToMoveWhatItDoesNotHaveOrHold) {
   using Poses = std::map<std::size_t, Rigid3>;
   Rigid3 T_world_ref;
   T_world_ref.translation = {1, 0, 0};
@@ -247,7 +247,7 @@ TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
 TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
   std::mt19937 random(5);
   GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
-  options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them settle
+  options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them finalize
   constexpr std::size_t kMovable = 3;
   RefinedCloud cloud(options, kMovable);
   cloud.insertFixed({}, {});
@@ -262,7 +262,7 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
     if (k >= kMovable) moves[k - kMovable] = drawMotion(0.1, 0.1, random);
     for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = drawMotion(0.1, 0.1, random);
     cloud.move(moves);
-    if (k % 3 != 2) continue;  // others stay pending while keyframes are settled
+    if (k % 3 != 2) continue;  // others stay pending while keyframes are finalized
     cloud.applyPending(0);
     for (const auto& [keyframe, T_world_ref] : moves) {
       const bool moved = isSame(cloud.T_world_ref()[keyframe], T_world_ref);
@@ -270,7 +270,7 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
       if (!moved) ++stayed;
     }
   }
-  EXPECT_GT(cloud.cloud().settledVoxels(), 0U);
+  EXPECT_GT(cloud.cloud().finalizedVoxels(), 0U);
   EXPECT_GT(stayed, 0U);
   cloud.applyPending(0);
   GlobalCloud same(options);
@@ -298,12 +298,12 @@ TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
                          : cloud.insert(points, T_world_ref);
       same.insert(k, in_world, T_world_ref);
     }
-    EXPECT_GT(cloud.cloud().settledVoxels(), 0U) << movable << ", " << of_earlier_map;
+    EXPECT_GT(cloud.cloud().finalizedVoxels(), 0U) << movable << ", " << of_earlier_map;
     EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
   }
 }
 
-TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
+TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARejectedMoveItIsAsBefore) {
   std::mt19937 random(4);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
   RefinedCloud cloud(options, RefinedCloud::kAll);

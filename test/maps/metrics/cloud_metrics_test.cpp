@@ -102,7 +102,7 @@ TEST(CloudErrors, AreExactFarFromTheOrigin) {
   EXPECT_NEAR(distances.at(0), 0.001, 1e-9);
 }
 
-TEST(CloudErrors, RefuseEmptyCloudsAndInvalidPoints) {
+TEST(CloudErrors, RejectEmptyCloudsAndInvalidPoints) {
   const Points one = pointsAt({{0, 0, 0}});
   EXPECT_THROW(cloudErrors({}, one, {1}), std::invalid_argument);
   EXPECT_THROW(cloudErrors(one, {}, {1}), std::invalid_argument);

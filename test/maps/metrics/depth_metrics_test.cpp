@@ -41,7 +41,7 @@ TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
   EXPECT_EQ(pairDepths({estimate, truth}, {1})[0].truth_m, 4);
 }
 
-TEST(PairDepths, MapsOfDifferentSizeAreRefused) {
+TEST(PairDepths, MapsOfDifferentSizeAreRejected) {
   EXPECT_THROW(pairDepths({cv::Mat1f::ones(2, 3), cv::Mat1f::ones(3, 2)}), std::invalid_argument);
 }
 
@@ -204,7 +204,7 @@ TEST(PrecisionRecall, WithoutPixelsAreZero) {
   EXPECT_EQ(counts.f1(0), 0);
 }
 
-TEST(PrecisionRecall, RefusesInvalidThresholdsAndSizes) {
+TEST(PrecisionRecall, RejectsInvalidThresholdsAndSizes) {
   const ComparedDepths depths{cv::Mat1f::ones(2, 2), cv::Mat1f::ones(2, 2), {}};
   EXPECT_THROW(precisionRecall(depths, {0.1, 0}), std::invalid_argument);
   EXPECT_THROW(precisionRecall({cv::Mat1f::ones(2, 3), cv::Mat1f::ones(2, 2), {}}, {1}),

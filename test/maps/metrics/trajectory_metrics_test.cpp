@@ -46,7 +46,7 @@ TEST(AssociatePoses, EachPoseOfTheShorterIsPairedWithTheNearestInTimeUpToTheLimi
   EXPECT_TRUE(paired({}, {}, 1).empty());
 }
 
-TEST(AssociatePoses, RefusesAnInvalidLimit) {
+TEST(AssociatePoses, RejectsAnInvalidLimit) {
   EXPECT_THROW(associatePoses({}, {}, -1e-9), std::invalid_argument);
   EXPECT_THROW(associatePoses({}, {}, 1.001e6), std::invalid_argument);
   EXPECT_NO_THROW(associatePoses({}, {}, 1e6));
@@ -113,7 +113,7 @@ TEST(AbsoluteErrors, AlignmentAtTheOriginMakesTheFirstPosesCoincide) {
   EXPECT_THAT(errors.translation_m, ElementsAre(DoubleNear(0, 1e-12), DoubleNear(1, 1e-12)));
 }
 
-TEST(AbsoluteErrors, TooFewPairsOrPositionsOnALineAreRefused) {
+TEST(AbsoluteErrors, TooFewPairsOrPositionsOnALineAreRejected) {
   const auto along = [](double gradient) {
     std::vector<PosePair> pairs;
     for (int i = 0; i < 5; ++i)

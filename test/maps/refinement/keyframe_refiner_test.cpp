@@ -264,7 +264,7 @@ TEST(KeyframeRefiner, ExtremeVariancesMakeNothingWorse) {
   }
 }
 
-TEST(KeyframeRefiner, APoseOrANoiseThatIsNotFiniteIsRefusedAndChangesNothing) {
+TEST(KeyframeRefiner, APoseOrANoiseThatIsNotFiniteIsRejectedAndChangesNothing) {
   const Walk walk;
   KeyframeRefiner plain(quick());
   KeyframeRefiner disturbed(quick());
@@ -273,19 +273,19 @@ TEST(KeyframeRefiner, APoseOrANoiseThatIsNotFiniteIsRefusedAndChangesNothing) {
   rotated.rotation.x() = nan;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto cloud = [&] { return RegistrationCloud(walk.seen[i], quick().points); };
-    const auto expect_refused = [&](const Rigid3& pose, const std::optional<PoseNoise>& stated) {
+    const auto expect_rejected = [&](const Rigid3& pose, const std::optional<PoseNoise>& stated) {
       EXPECT_THAT([&] { disturbed.add(cloud(), pose, stated); },
                   ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe: ")));
     };
-    expect_refused(rotated, {});
-    expect_refused(viewTurned(0, {0, 0, std::numeric_limits<double>::infinity()}), {});
+    expect_rejected(rotated, {});
+    expect_rejected(viewTurned(0, {0, 0, std::numeric_limits<double>::infinity()}), {});
     for (const double beyond_m : {-1.001e9, 1.001e9}) {
-      expect_refused(viewTurned(0, {beyond_m, 0, 0}), {});
-      expect_refused(viewTurned(0, {0, beyond_m, 0}), {});
+      expect_rejected(viewTurned(0, {beyond_m, 0, 0}), {});
+      expect_rejected(viewTurned(0, {0, beyond_m, 0}), {});
     }
     for (const double wrong : {nan, -1e-9, std::numeric_limits<double>::infinity()}) {
-      expect_refused({}, PoseNoise{wrong, 0});
-      expect_refused({}, PoseNoise{0, wrong});
+      expect_rejected({}, PoseNoise{wrong, 0});
+      expect_rejected({}, PoseNoise{0, wrong});
     }
     EXPECT_NO_THROW(KeyframeRefiner::requireUsable(viewTurned(0, {0, 0, -1e9}), PoseNoise{}));
     EXPECT_EQ(disturbed.keyframes(), i);
@@ -373,19 +373,19 @@ TEST(KeyframeRefiner, ALoopThatOtherFactorsContradictIsDropped) {
   }
 }
 
-TEST(KeyframeRefiner, ProposalsOfUnknownKeyframesAreRefused) {
+TEST(KeyframeRefiner, ProposalsOfUnknownKeyframesAreRejected) {
   const Walk walk;
   KeyframeRefiner refiner(quick());
   EXPECT_THROW(refiner.propose({0, 1, {}}), std::invalid_argument);
   for (std::size_t i = 0; i < 3; ++i) {
     refiner.add(RegistrationCloud(walk.seen[i], quick().points), walk.tracked[i]);
   }
-  const auto refused = [&](std::size_t older, std::size_t newer) {
+  const auto rejected = [&](std::size_t older, std::size_t newer) {
     return messageOf([&] { refiner.propose({older, newer, {}}); });
   };
-  EXPECT_THAT(refused(0, 3), HasSubstr("newer keyframe of a loop = 3"));
-  EXPECT_THAT(refused(3, 2), HasSubstr("older keyframe of a loop = 3"));
-  EXPECT_THAT(refused(1, 1), HasSubstr("another one"));
+  EXPECT_THAT(rejected(0, 3), HasSubstr("newer keyframe of a loop = 3"));
+  EXPECT_THAT(rejected(3, 2), HasSubstr("older keyframe of a loop = 3"));
+  EXPECT_THAT(rejected(1, 1), HasSubstr("another one"));
   EXPECT_EQ(refiner.counts().loop_checks, 0U);
 }
 

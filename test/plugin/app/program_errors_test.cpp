@@ -27,7 +27,7 @@ std::string wordsOf(const Raise& raise) {
   try {
     raise();
   } catch (const std::exception& error) {
-    return inWords(error);
+    return userMessage(error);
   }
   return "no exception";
 }

@@ -108,7 +108,7 @@ TEST_F(DepthFile, WrongKindsOfImagesAreErrorsThatNameTheKind) {
 }
 
 TEST_F(DepthFile, WrongHeadersOfPfmAreErrorsThatNameTheLine) {
-  const auto refused = [&](const std::string& text) { return errorOf(write("a.pfm", text)); };
+  const auto rejected = [&](const std::string& text) { return errorOf(write("a.pfm", text)); };
   const std::pair<const char*, const char*> cases[] = {
       {"Pf 2\n3 2\n-1\n", "line 1: expected Pf alone"},
       {"PF\n3 2\n-1\n", "line 1: expected Pf alone"},
@@ -124,24 +124,24 @@ TEST_F(DepthFile, WrongHeadersOfPfmAreErrorsThatNameTheLine) {
       {"Pf\n1 1\n-1\n123", "3 bytes follow: expected 4"},
       {"Pf\n1 1\n-1\n12345", "5 bytes follow: expected 4"}};
   for (const auto& [text, expected] : cases)
-    EXPECT_THAT(refused(text), HasSubstr(expected)) << text;
+    EXPECT_THAT(rejected(text), HasSubstr(expected)) << text;
 }
 
 TEST_F(DepthFile, WrongHeadersOfNumpyAreErrors) {
-  const auto refused = [&](const std::string& dictionary) {
+  const auto rejected = [&](const std::string& dictionary) {
     return errorOf(write("a.npy", npy(dictionary, bytesOf<float>({1, 2, 3, 4, 5, 6}))));
   };
   const std::string order = "'fortran_order': False, ";
-  EXPECT_THAT(refused("{'descr': '<i4', " + order + "'shape': (2, 3), }"), HasSubstr("<i4"));
-  EXPECT_THAT(refused("{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }"),
+  EXPECT_THAT(rejected("{'descr': '<i4', " + order + "'shape': (2, 3), }"), HasSubstr("<i4"));
+  EXPECT_THAT(rejected("{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }"),
               HasSubstr("fortran_order"));
   for (const char* shape :
        {"(6,)", "(1, 2, 3)", "()", "(2, x)", "(0, 3)", "(3, 0)", "(2, 65536)"}) {
-    EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': " + shape + ", }"),
+    EXPECT_THAT(rejected("{'descr': '<f4', " + order + "'shape': " + shape + ", }"),
                 HasSubstr("shape"))
         << shape;
   }
-  EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': (1, 65535), }"),
+  EXPECT_THAT(rejected("{'descr': '<f4', " + order + "'shape': (1, 65535), }"),
               HasSubstr("expected 262140 for 65535x1 float32"));
 }
 

@@ -177,7 +177,7 @@ TEST(CEventFusionMap, IgnoresOtherObservations) {
   EXPECT_FALSE(map.canComputeObservationLikelihood(mrpt::obs::CObservationComment()));
 }
 
-TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChangeWhichAClearedOneDoesAndNotItsCopies) {
+TEST(CEventFusionMap, RejectsAnInvalidPointAndDoesNotChangeWhichAClearedOneDoesAndNotItsCopies) {
   CEventFusionMap map = mapOf(2);
   const CEventFusionMap before = map;
   StoredKeyframe wrong = randomKeyframe(5);

@@ -585,7 +585,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
          r.last_error = "why";
        }),
        "refinement-failures: the refinement failed 2 times, the last time with: why;"},
-      {refined([](auto& r) { r.counts.failed_solves = 3; }), "failed-solves: 3 minima of"},
+      {refined([](auto& r) { r.counts.failed_solves = 3; }), "failed-solves: 3 failed solves of"},
       {[](auto& s, auto&) { s.scene_unknown = true; }, "no-scene: "},
       {live([](auto&) {}), ""},
       {live([](auto& s) {
@@ -594,27 +594,27 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
          camera.queued = 20;
          camera.lost = 10;
          camera.fates[EventFate::kPaused] = 80;
-         camera.fates[EventFate::kRefused] = 1;
+         camera.fates[EventFate::kRejected] = 1;
          camera.fates[EventFate::kAfterEnd] = 2;
          s.counts.dropped_windows[DropReason::kJump] = 3;
        }),
-       "events-lost: 6.5 % of the events were lost; 3 windows given up: 3 "},
-      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kThinned] = 1; }),
-       "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
+       "events-lost: 6.5 % of the events were lost; 3 windows dropped: 3 "},
+      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kSubsampled] = 1; }),
+       "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events were more than "
        "[live] max_event_rate lets pass"},
       {live([](auto& s) {
-         s.live->cameras[1].fates[EventFate::kThinned] = 1;
+         s.live->cameras[1].fates[EventFate::kSubsampled] = 1;
          s.live->too_large = "a window needs 5 events";
        }),
-       "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
+       "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events were more than "
        "[live] max_event_rate lets pass; a window needs 5 events"},
       {live([](auto& s) { s.live->cameras[1].fates[EventFate::kQueueFull] = 3; }),
-       "events-lost: 1.5 % of the events were lost; 0 windows given up; the machine is too slow"},
+       "events-lost: 1.5 % of the events were lost; 0 windows dropped; the machine is too slow"},
       {live([](auto& s) {
          s.counts.dropped_windows[DropReason::kOverload] = 2;
          s.counts.dropped_windows[DropReason::kError] = 1;
        }),
-       "events-lost: 0.0 % of the events were lost; 3 windows given up: "},
+       "events-lost: 0.0 % of the events were lost; 3 windows dropped: "},
       {live([](auto& s) {
          s.live->errors = 2;
          s.live->last_error = "why";
@@ -637,10 +637,10 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
 TEST(SessionStatus, IsSaidInWords) {
   SessionStatus status;
   DroppedWindows& windows = status.counts.dropped_windows;
-  EXPECT_EQ(asText(windows), "0 windows given up");
+  EXPECT_EQ(asText(windows), "0 windows dropped");
   windows[DropReason::kOverload] = 2;
   windows[DropReason::kNoPose] = 1;
-  EXPECT_EQ(asText(windows), "3 windows given up: 2 for overload, 1 without poses");
+  EXPECT_EQ(asText(windows), "3 windows dropped: 2 for overload, 1 without poses");
   status.chosen = {{"window_s", 0.5, "why"}, {"num_planes", 60, "so"}};
   EXPECT_EQ(choiceText(status),
             "options chosen from the data: window_s = 0.5 (why); num_planes = 60 (so)");

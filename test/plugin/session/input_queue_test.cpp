@@ -58,7 +58,7 @@ RC_GTEST_PROP(EventBudget, KeepsAtMostTheBudgetOfEach10MsWhateverThePackets, ())
   const std::vector<Event> result = passed(budget, events, ends, *rc::gen::arbitrary<bool>());
 
   RC_ASSERT(result == expected);
-  RC_ASSERT(budget.thinned() + result.size() == events.size());
+  RC_ASSERT(budget.subsampled() + result.size() == events.size());
   const auto in_interval = [](const std::vector<Event>& all, std::int64_t k) {
     return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [k](const Event& event) {
       return event.t_ns >= k * kIntervalNs && event.t_ns < (k + 1) * kIntervalNs;
@@ -86,7 +86,7 @@ TEST(EventBudget, LateEventsCountForTheCurrent10Ms) {
   }
   EventBudget budget(500);
   EXPECT_EQ(passed(budget, eventsAt(times_ns), {}, false).size(), 15U);
-  EXPECT_EQ(budget.thinned(), 105U);
+  EXPECT_EQ(budget.subsampled(), 105U);
 }
 
 TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
@@ -199,7 +199,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
 }
 
 /// A stream with pauses in random packets. A time far ahead follows some events and poses.
-RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
+RC_GTEST_PROP(InputQueue, RejectsAloneWhatIsFarAheadOfItsStream, ()) {
   LiveOptions options;
   options.max_event_rate = *rc::gen::element(0.0, 1e9);
   InputQueue queue(options);
@@ -239,8 +239,8 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   for (const PoseSample& pose : batch.poses) poses_ns.push_back(pose.t_ns);
   RC_ASSERT(events_ns == expected);
   RC_ASSERT(poses_ns == expected);
-  RC_ASSERT(queue.counts().at(0).fates[EventFate::kRefused] == wrong);
-  RC_ASSERT(queue.refusedPoses() == wrong);
+  RC_ASSERT(queue.counts().at(0).fates[EventFate::kRejected] == wrong);
+  RC_ASSERT(queue.rejectedPoses() == wrong);
 }
 
 TEST(InputQueue, EndPassesTheHeldEvents) {
@@ -256,7 +256,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_TRUE(batch.ended);
   ASSERT_EQ(batch.packets.size(), 2U);
   EXPECT_EQ(batch.packets[1].events.size(), 10U);
-  EXPECT_EQ(queue.counts().at(0).fates[EventFate::kThinned], 20U);
+  EXPECT_EQ(queue.counts().at(0).fates[EventFate::kSubsampled], 20U);
   EXPECT_EQ(queue.counts().at(0).fates[EventFate::kAfterEnd], 30U);
   EXPECT_EQ(queue.counts().at(0).queued, 0U);
   queue.skip(packet(0, 7, 5));
@@ -264,7 +264,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_EQ(queue.counts().at(0).received, 65U);
   EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
   queue.add(PoseSample{{}, 1, {}, {}});
-  EXPECT_EQ(queue.refusedPoses(), 1U);
+  EXPECT_EQ(queue.rejectedPoses(), 1U);
   EXPECT_TRUE(queue.take().poses.empty());
 }
 

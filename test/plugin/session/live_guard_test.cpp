@@ -162,7 +162,7 @@ TEST(LiveGuard, WindowsAreDroppedWhosePosesAreOverdue) {
 TEST(LiveGuard, CountsInLiveOperationAlone) {
   LiveGuard guard = liveGuard();
   EXPECT_TRUE(guard.countRejectedPose());
-  EXPECT_EQ(guard.status()->refused_poses, 1U);
+  EXPECT_EQ(guard.status()->rejected_poses, 1U);
   EXPECT_TRUE(guard.fillsQueue(2'500'001)) << "half of 5,000,000";
   EXPECT_FALSE(guard.fillsQueue(2'500'000));
   LiveGuard playback{LiveOptions{}};

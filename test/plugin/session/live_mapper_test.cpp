@@ -279,15 +279,15 @@ TEST(LiveMapper, LossesAreLoggedWithNumbersAndLatePosesAreCounted) {
   mapper.finish();
   ASSERT_FALSE(log.lines.empty());
   EXPECT_EQ(log.lines[0],
-            "so far 0 windows given up; camera 0: 0 dropped, 0 thinned, 0 refused, 0 lost "
-            "afterwards, of 0 events; camera 1: 0 dropped, 23 thinned, 0 refused, 0 lost "
+            "so far 0 windows dropped; camera 0: 0 dropped, 0 subsampled, 0 rejected, 0 lost "
+            "afterwards, of 0 events; camera 1: 0 dropped, 23 subsampled, 0 rejected, 0 lost "
             "afterwards, of 34 events");
 
   Mapper other(live());
   addPatiently(other, samplesOf(recording));
   other.add(sampleOf({SyntheticRecording::kStartNs - 9000 * kMsNs, {}}, {PoseKind::kPose, "pose"}));
   other.finish();
-  EXPECT_EQ(other.status().live->refused_poses, 1U);
+  EXPECT_EQ(other.status().live->rejected_poses, 1U);
   EXPECT_EQ(other.status().live->errors, 0U);
   EXPECT_THAT(other.status().live->last_error, HasSubstr("the pose at 1.0"));
 }

@@ -288,7 +288,7 @@ TEST(StatedNoise, CountsOnlyOfTheFirstPoseOfATimeAndItsSource) {
   expectSameMap(*map(wrong, std::nullopt), *map(std::nullopt, std::nullopt));
 }
 
-TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRefusesDoesNotShiftTheOthers) {
+TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRejectsDoesNotShiftTheOthers) {
   SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   EventFusionOptions options = optionsOf(GetParam());
   options.mapper.trajectory.max_pose_gap_s = 0.02;
@@ -302,17 +302,17 @@ TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRefusesDoesNotShiftTheO
   addEvents(session, recording);
   session.finish();
   std::vector<KeyframeDepthMap> keyframes;
-  int refused = 0;
+  int rejected = 0;
   for (bool more = true; more;) {
     try {
       auto keyframe = session.next();
       more = keyframe.has_value();
       if (keyframe) keyframes.push_back(std::move(*keyframe));
     } catch (const std::invalid_argument&) {
-      ++refused;
+      ++rejected;
     }
   }
-  EXPECT_EQ(refused, 2);
+  EXPECT_EQ(rejected, 2);
   EXPECT_EQ(session.status().counts.dropped_windows[DropReason::kError], 2U);
   EXPECT_EQ(session.status().counts.keyframes, keyframes.size());
   EXPECT_EQ(session.cloud().keyframes(), keyframes.size());

@@ -93,9 +93,9 @@ inline void expectSumsAgree(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     EXPECT_EQ(queue.received, queue.held + queue.queued + queue.taken + queue.fates.total());
     const EventCounts counts = countsOf(status, camera);
-    const auto rejected = status.refused_events.find(camera);
+    const auto rejected = status.rejected_events.find(camera);
     EXPECT_EQ(queue.taken,
-              counts.read + (rejected == status.refused_events.end() ? 0 : rejected->second));
+              counts.read + (rejected == status.rejected_events.end() ? 0 : rejected->second));
     EXPECT_EQ(counts.read, counts.fates.total());
   }
 }

@@ -166,7 +166,7 @@ TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
   EXPECT_EQ(status.live->cameras.at(0).fates[EventFate::kAfterEnd] +
                 status.live->cameras.at(1).fates[EventFate::kAfterEnd],
             events);
-  EXPECT_EQ(status.live->refused_poses, poses);
+  EXPECT_EQ(status.live->rejected_poses, poses);
   EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);
 }
 

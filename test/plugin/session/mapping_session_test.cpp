@@ -174,14 +174,14 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
     MappingSession session(options);
     feed(session, recording, 0);
     feed(session, later, -100);
-    EXPECT_EQ(session.status().live->clock_steps, 0U) << "not yet";
+    EXPECT_EQ(session.status().live->clock_resets, 0U) << "not yet";
     const std::size_t made = mapRest(session).size();
-    EXPECT_EQ(session.status().live->clock_steps, 1U);
+    EXPECT_EQ(session.status().live->clock_resets, 1U);
     EXPECT_GE(made, complete + (is_automatic ? 0 : 1)) << "those before it, and some after it";
     EXPECT_EQ(session.status().held_events, 0U);
-    std::uint64_t refused = 0;
-    for (const auto& [camera, events] : session.status().refused_events) refused += events;
-    expectEventsAddUp(session.status(), recording.totalEvents() + later.totalEvents() - refused);
+    std::uint64_t rejected = 0;
+    for (const auto& [camera, events] : session.status().rejected_events) rejected += events;
+    expectEventsAddUp(session.status(), recording.totalEvents() + later.totalEvents() - rejected);
   }
 }
 
@@ -204,11 +204,11 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
     for (const double jump_s : row.jumps_s) {
       begins_ns.push_back(SyntheticRecording::kStartNs + durationFromSeconds(jump_s));
     }
-    const auto stretchOf = [&](std::int64_t t_ns) {
+    const auto segmentOf = [&](std::int64_t t_ns) {
       return std::upper_bound(begins_ns.begin(), begins_ns.end(), t_ns) - begins_ns.begin();
     };
     for (StampedPose& pose : recording.poses) {
-      pose.T_world_rig.translation.y() += 10.0 * static_cast<double>(stretchOf(pose.t_ns));
+      pose.T_world_rig.translation.y() += 10.0 * static_cast<double>(segmentOf(pose.t_ns));
     }
     EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
@@ -222,8 +222,8 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
     EXPECT_EQ(session.status().live->pose_jumps, row.jumps_s.size()) << what;
     std::set<std::ptrdiff_t> mapped;
     for (const KeyframeDepthMap& keyframe : keyframes) {
-      EXPECT_EQ(stretchOf(keyframe.window.t0_ns), stretchOf(keyframe.window.t1_ns - 1)) << what;
-      mapped.insert(stretchOf(keyframe.window.t0_ns));
+      EXPECT_EQ(segmentOf(keyframe.window.t0_ns), segmentOf(keyframe.window.t1_ns - 1)) << what;
+      mapped.insert(segmentOf(keyframe.window.t0_ns));
     }
     EXPECT_EQ(mapped, row.mapped) << what;
     EXPECT_LT(medianErrorInSteps(session), 1.5) << what;
@@ -310,7 +310,7 @@ TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
   for (const bool zero_is_there : {false, true}) {
     MappingSession session(syntheticOptions());
     std::uint64_t fed = 0;
-    std::uint64_t refused = 0;
+    std::uint64_t rejected = 0;
     std::int64_t since_ns = 0;
     for (int i = 0; i < 150; ++i) {
       if (zero_is_there) session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
@@ -323,16 +323,16 @@ TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
                 : zero_is_there ? "the recording has events of camera 2 but none of camera 1"
                                 : "the recording has events of camera 2 but none of camera 0");
       fed += packet.events.size();
-      if (is_late) refused += packet.events.size();
+      if (is_late) rejected += packet.events.size();
     }
-    EXPECT_GT(refused, 200U);
-    EXPECT_EQ(session.status().refused_events.at(2), refused);
+    EXPECT_GT(rejected, 200U);
+    EXPECT_EQ(session.status().rejected_events.at(2), rejected);
     EXPECT_THROW(session.finish(), std::invalid_argument);
-    EXPECT_EQ(session.status().refused_events.at(2), fed) << "all";
+    EXPECT_EQ(session.status().rejected_events.at(2), fed) << "all";
   }
 }
 
-TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
+TEST(MappingSession, ARejectedPacketTakesNoOtherWithIt) {
   const SyntheticRecording recording;
   EventFusionOptions options = syntheticOptions();
   options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
@@ -350,7 +350,7 @@ TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
   const SessionStatus status = session.status();
   EXPECT_EQ(status.counts.cameras.at(0).read, recording.events[0].size());
   EXPECT_EQ(status.counts.cameras.at(1).read, good.events.size());
-  EXPECT_EQ(status.refused_events.at(1), outside.events.size());
+  EXPECT_EQ(status.rejected_events.at(1), outside.events.size());
   EXPECT_EQ(status.events->first_ns, recording.events[0].front().t_ns);
   EXPECT_NO_THROW(session.finish());
 }

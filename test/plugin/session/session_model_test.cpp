@@ -46,7 +46,7 @@ Table tableOf(const SessionStatus& status) {
         of[EventFate::kFiltered] + of[EventFate::kOutsideLens] + of[EventFate::kOverBudget];
     table[name("silent in keyframes")] = status.silent_keyframes.at(c);
   }
-  for (const auto& [camera, events] : status.refused_events) {
+  for (const auto& [camera, events] : status.rejected_events) {
     table[fmt::format("camera {} refused", camera)] = events;
   }
   for (const DropReasonRow& row : kDropReasons) {
@@ -58,8 +58,8 @@ Table tableOf(const SessionStatus& status) {
   table["late_events"] = counts.late_events;
   table["duplicate_poses"] = counts.duplicate_poses;
   table["pose_jumps"] = status.live->pose_jumps;
-  table["clock_steps"] = status.live->clock_steps;
-  table["refused_poses"] = status.live->refused_poses;
+  table["clock_steps"] = status.live->clock_resets;
+  table["refused_poses"] = status.live->rejected_poses;
   return table;
 }
 
@@ -97,7 +97,7 @@ class Model {
     if (!rig_complete_ && is_odometry) {
       waiting_.push_back(pose);  // waits for a better source
     } else if (!use(pose)) {
-      ++status.live->refused_poses;
+      ++status.live->rejected_poses;
       const auto& newest = clock_.newest_pose;
       if (newest && pose.t_ns < newest->t_ns - kS) noteOlder(kTracker, pose.t_ns);
     } else {
@@ -119,7 +119,7 @@ class Model {
     const auto is_before = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
     if (!events.empty() && std::is_sorted(events.begin(), events.end(), is_before) &&
         std::all_of(events.begin(), events.end(), is_late)) {
-      status.refused_events[c] += events.size();
+      status.rejected_events[c] += events.size();
       return noteOlder(c, events.front().t_ns);
     }
     std::vector<std::int64_t> in_time;
@@ -136,7 +136,7 @@ class Model {
       camera.covered_ns = std::max(camera.covered_ns, *packet.covered_until_ns);
     }
     if (in_time.empty()) {
-      if (packet.covered_until_ns) giveUpMissing(c, *packet.covered_until_ns);
+      if (packet.covered_until_ns) dropMissing(c, *packet.covered_until_ns);
       return;
     }
     const std::int64_t first_ns = in_time.front();
@@ -144,15 +144,15 @@ class Model {
     camera.newest_ns = std::max(camera.newest_ns.value_or(last_ns), last_ns);
     clock_.newest_begin_ns = std::max(clock_.newest_begin_ns, first_ns);
     clock_.reached_ns = std::max(clock_.reached_ns, last_ns);
-    giveUpMissing(c, last_ns);
+    dropMissing(c, last_ns);
     clock_.older.erase(c);
     for (auto& [other, older] : clock_.older) older.others_ns[c] = first_ns;
     const std::map<int, MissingEvents> missing = clock_.missing;
     for (const auto& [other, lacking] : missing) {
-      if (lacking.until_ns <= clock_.newest_begin_ns) giveUpMissing(other, kMaxTimeNs);
+      if (lacking.until_ns <= clock_.newest_begin_ns) dropMissing(other, kMaxTimeNs);
     }
     clock_.first_ns = std::min(clock_.first_ns, first_ns);
-    const bool known = !clock_.poses_ns.empty() || !clock_.next_stretch.empty();
+    const bool known = !clock_.poses_ns.empty() || !clock_.next_segment.empty();
     const bool fills_queue = static_cast<double>(heldEvents()) > queue_events_ / 2;
     if (known || fills_queue || clock_.newest_begin_ns - clock_.first_ns > kS) completeRig();
   }
@@ -166,7 +166,7 @@ class Model {
 
   void finish() {
     finished_ = true;
-    while (!clock_.missing.empty()) giveUpMissing(clock_.missing.begin()->first, kMaxTimeNs);
+    while (!clock_.missing.empty()) dropMissing(clock_.missing.begin()->first, kMaxTimeNs);
     completeRig();
   }
 
@@ -214,7 +214,7 @@ class Model {
   }
 
   bool rigIsComplete() const { return rig_complete_; }
-  void giveUpOlderHalf() {
+  void dropOlderHalf() {
     std::int64_t oldest_ns = kMaxTimeNs;  // oldest event that no earlier event can follow
     for (const Camera& camera : clock_.cameras) {
       for (const Held& event : camera.held) {
@@ -238,7 +238,7 @@ class Model {
     if (clock_.reached_ns == kMinTimeNs) return;
     std::optional<std::int64_t> newest_pose_ns;
     if (clock_.newest_pose) newest_pose_ns = clock_.newest_pose->t_ns;
-    if (!clock_.next_stretch.empty()) newest_pose_ns = clock_.next_stretch.back().t_ns;
+    if (!clock_.next_segment.empty()) newest_pose_ns = clock_.next_segment.back().t_ns;
     if (!waiting_.empty()) newest_pose_ns = waiting_.back().t_ns;
     const std::int64_t overdue_ns = clock_.reached_ns - pose_wait_ns_;
     if (!newest_pose_ns || *newest_pose_ns < overdue_ns) {
@@ -278,7 +278,7 @@ class Model {
     std::array<Camera, kCameras> cameras;
     std::set<std::int64_t> poses_ns;
     std::optional<StampedPose> newest_pose;
-    std::vector<StampedPose> next_stretch;  // poses after a jump
+    std::vector<StampedPose> next_segment;  // poses after a jump
     std::optional<std::int64_t> start_ns;
     std::int64_t next = 0;  // number of the next window
     std::int64_t first_ns = kMaxTimeNs;
@@ -318,12 +318,12 @@ class Model {
     useAll(std::exchange(waiting_, {}));
   }
   void useAll(const std::vector<StampedPose>& poses) {
-    for (const StampedPose& pose : poses) status.live->refused_poses += use(pose) ? 0 : 1;
+    for (const StampedPose& pose : poses) status.live->rejected_poses += use(pose) ? 0 : 1;
   }
   /// @return false if the pose is rejected.
   bool use(const StampedPose& pose) {
-    if (!clock_.next_stretch.empty() || isJump(pose)) {
-      clock_.next_stretch.push_back(pose);
+    if (!clock_.next_segment.empty() || isJump(pose)) {
+      clock_.next_segment.push_back(pose);
       return true;
     }
     if (!pose.T_world_rig.translation.allFinite()) return false;
@@ -339,12 +339,12 @@ class Model {
            max_speed_m_s_ * 1e-9 * static_cast<double>(pose.t_ns - clock_.newest_pose->t_ns);
   }
   bool beginStretch() {
-    if (clock_.next_stretch.empty()) return false;
+    if (clock_.next_segment.empty()) return false;
     if (!finished_ && eventsCompleteNs() < clock_.newest_pose->t_ns) return false;
     ++status.live->pose_jumps;
-    dropWindowsBefore(clock_.next_stretch.front().t_ns, DropReason::kJump);
+    dropWindowsBefore(clock_.next_segment.front().t_ns, DropReason::kJump);
     clock_.newest_pose.reset();
-    useAll(std::exchange(clock_.next_stretch, {}));
+    useAll(std::exchange(clock_.next_segment, {}));
     return true;
   }
 
@@ -394,7 +394,7 @@ class Model {
     if (reason != DropReason::kPaused) lose(from_ns, until_ns);
     release(t_ns);
   }
-  void giveUpMissing(int camera, std::int64_t next_ns) {
+  void dropMissing(int camera, std::int64_t next_ns) {
     const auto missing = clock_.missing.find(camera);
     if (missing == clock_.missing.end()) return;
     dropWindowsBefore(std::min(missing->second.until_ns, next_ns), missing->second.reason);
@@ -445,7 +445,7 @@ class Model {
     if (!clock_reset_) return false;
     dropWindowsBefore(clock_.reached_ns + 1, DropReason::kClockReset);
     clock_ = {};
-    ++status.live->clock_steps;
+    ++status.live->clock_resets;
     clock_reset_ = false;
     for (const auto& call : std::exchange(later_, {})) call();
     return true;
@@ -524,7 +524,7 @@ class Run {
     queue_.add(sampleOf(recording_.poses[0]));
     queue_.add(EventPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
     RC_ASSERT(queue_.counts().at(0).fates[EventFate::kAfterEnd] == 1U);
-    RC_ASSERT(queue_.refusedPoses() >= 1U);
+    RC_ASSERT(queue_.rejectedPoses() >= 1U);
   }
 
  private:
@@ -630,7 +630,7 @@ class Run {
       return taken;
     };
     for (const PoseSample& pose : batch.poses) {
-      refused_poses_ += add([&] { session_.addPose(pose); }) ? 0 : 1;
+      rejected_poses_ += add([&] { session_.addPose(pose); }) ? 0 : 1;
       model_.addPose({pose.t_ns, pose.T_world_body}, source_.kind != PoseKind::kPose);
     }
     for (const auto& [camera, missing] : batch.missing) {
@@ -670,7 +670,7 @@ class Run {
       model_.map(*oldest, Model::Outcome::kTooMuch);
       oldest = model_.oldestWindow();
     }
-    if (!oldest) model_.giveUpOlderHalf();
+    if (!oldest) model_.dropOlderHalf();
   }
 
   bool mapNext(int fault) {
@@ -705,7 +705,7 @@ class Run {
 
   void compare() {
     SessionStatus status = session_.status();
-    status.live->refused_poses += refused_poses_;
+    status.live->rejected_poses += rejected_poses_;
     const Table table = tableOf(status);
     if (predicts_) {
       RC_ASSERT(differences(table, tableOf(model_.status)) == std::vector<std::string>{});
@@ -724,13 +724,13 @@ class Run {
       const auto index = static_cast<std::size_t>(camera);
       RC_ASSERT(counts.queued == 0U);
       RC_ASSERT(counts.taken == taken_[index]);
-      const auto refused = status.refused_events.find(camera);
-      const std::uint64_t refused_events =
-          refused == status.refused_events.end() ? 0 : refused->second;
+      const auto rejected = status.rejected_events.find(camera);
+      const std::uint64_t rejected_events =
+          rejected == status.rejected_events.end() ? 0 : rejected->second;
       const EventCounts& of = status.counts.cameras.at(index);
-      RC_ASSERT(counts.taken == of.read + refused_events);
+      RC_ASSERT(counts.taken == of.read + rejected_events);
       RC_ASSERT(status.live->cameras.at(camera).lost ==
-                refused_events + of[EventFate::kDropped] + of[EventFate::kWithoutPose]);
+                rejected_events + of[EventFate::kDropped] + of[EventFate::kWithoutPose]);
     }
   }
 
@@ -749,7 +749,7 @@ class Run {
   std::int64_t shift_ns_ = 0;
   double away_m_ = 0;
   bool taking_ = true;
-  std::uint64_t refused_poses_ = 0;
+  std::uint64_t rejected_poses_ = 0;
   std::uint64_t keyframes_ = 0;
   Table earlier_;
 };

@@ -102,7 +102,7 @@ TEST(FrameDepth, IsUnsureOfEdgesAlongTheMotion) {
   EXPECT_GT(cv::countNonZero(depth.likely), 5000);
 }
 
-TEST(FrameDepth, RefusesOptionsThatMakeNoSense) {
+TEST(FrameDepth, RejectsOptionsThatMakeNoSense) {
   FrameDepthOptions options;
   options.max_baseline_m = options.min_baseline_m;
   EXPECT_THROW(options.validate(), std::invalid_argument);

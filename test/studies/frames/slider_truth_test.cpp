@@ -31,7 +31,7 @@ TEST(EdgeKinds, LinesAreOnePixelWide) {
   EXPECT_EQ(cv::countNonZero(edges.horizontal_lines.row(30)), 0);
 }
 
-TEST(EdgeKinds, RefuseAnglesThatOverlap) {
+TEST(EdgeKinds, RejectAnglesThatOverlap) {
   EdgeKindOptions options;
   options.vertical_deg = 80;
   EXPECT_THROW(edgeKinds(block(), options), std::invalid_argument);

@@ -315,7 +315,7 @@ TEST(TrackerFaults, LosePosesBeforeTheyMoveThem) {
   }
 }
 
-TEST(TrackerFaults, OutOfRangeAreRefused) {
+TEST(TrackerFaults, OutOfRangeAreRejected) {
 #define WRONG(field, value) [](TrackerFaults& faults) { faults.field = value; }
   const std::pair<void (*)(TrackerFaults&), const char*> rows[] = {
       {WRONG(perturbation.keyframe.noise_m, 1),

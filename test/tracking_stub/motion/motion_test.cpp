@@ -52,7 +52,7 @@ TEST(LoopMotion, SwaysInTheFrameOfTheCamera) {
   EXPECT_NEAR(LoopMotion(options).poseAt(options.start_ns).translation.x(), 2.25, 1e-12);
 }
 
-TEST(LoopMotion, RefusesAPeriodOfZero) {
+TEST(LoopMotion, RejectsAPeriodOfZero) {
   LoopMotionOptions options;
   options.period_s = 0;
   EXPECT_THROW(LoopMotion{options}, std::invalid_argument);
@@ -198,7 +198,7 @@ TEST(SmoothTrajectory, KeepsPositionAndSpeedAtItsEnds) {
   }
 }
 
-TEST(SmoothTrajectory, RefusesLongGapsAndTooFewPoses) {
+TEST(SmoothTrajectory, RejectsLongGapsAndTooFewPoses) {
   auto poses = sampled(handHeld, 100, 4);
   poses.erase(poses.begin() + 100, poses.begin() + 250);
   EXPECT_THAT(messageOf([&] { smoothTrajectory(poses); }),

@@ -56,7 +56,7 @@ TEST(Texture, RepeatsItsBorder) {
   EXPECT_NEAR(edge.sample(1, 1, 1e6), 0.5, 0.1);
 }
 
-TEST(Texture, RefusesAPaintingWithoutTexels) {
+TEST(Texture, RejectsAPaintingWithoutTexels) {
   EXPECT_THROW(Texture(cv::Mat1f(), 0.01), std::invalid_argument);
   EXPECT_THROW(Texture(cv::Mat1f(2, 2, 0.0F), 0), std::invalid_argument);
 }
@@ -130,7 +130,7 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
   }
 }
 
-TEST(Scene, RefusesAnInvalidPole) {
+TEST(Scene, RejectsAnInvalidPole) {
   Scene scene;
   EXPECT_THROW(scene.addPole({{}, 0, 1}, test::evenPaint(0)), std::invalid_argument);
   EXPECT_THROW(scene.addPole({{}, 0.1, 0}, test::evenPaint(0)), std::invalid_argument);

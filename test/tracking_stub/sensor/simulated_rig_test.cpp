@@ -370,7 +370,7 @@ TEST(SimulatedRig, ReportsItsProgressToTheEnd) {
   EXPECT_DOUBLE_EQ(fractions.back(), 1);
 }
 
-TEST(SimulatedRig, RefusesInvalidSimulations) {
+TEST(SimulatedRig, RejectsInvalidSimulations) {
   const std::function<void(Simulation&)> mistakes[] = {
       [](Simulation& s) { s.rig.cameras[0].time_offset_ns = 5; },
       [](Simulation& s) { s.motion = nullptr; }, [](Simulation& s) { s.duration_ns = 0; }};

@@ -110,7 +110,7 @@ TEST_F(DatasetFolder, TruthCloudsLieOnSurfacesAndOnEdgesWithEvents) {
   }
 }
 
-TEST_F(DatasetFolder, RefusesARigWhoseFrameIsNotCameraZero) {
+TEST_F(DatasetFolder, RejectsARigWhoseFrameIsNotCameraZero) {
   simulation.rig.cameras[0].T_rig_cam.translation = {0, 0.1, 0};
   EXPECT_THROW(writeDataset(folder(), simulation, std::vector<CameraRecording>(2)),
                std::invalid_argument);

@@ -224,7 +224,7 @@ TEST_F(Mcap, DamagedDataHaveAnotherChecksum) {
 }
 
 // Without this check, a short file could contain the same chunk any number of times.
-TEST_F(Mcap, ChunksThatOverlapAreRefused) {
+TEST_F(Mcap, ChunksThatOverlapAreRejected) {
   write(2'000);
   std::string bytes = readText(file_);
   std::uint64_t size = 0;

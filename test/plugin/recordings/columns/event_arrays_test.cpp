@@ -206,7 +206,7 @@ TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
   EXPECT_THAT(errorOfFile(archive), HasSubstr("e.npz/p.npy: 2 rows: expected 3, as "));
 }
 
-TEST_F(EventArrays, DamagedFilesAreReadOrRefused) {
+TEST_F(EventArrays, DamagedFilesAreReadOrRejected) {
   const std::string structured =
       npyArray("[('', '|V2'), ('x', '>u2'), ('y', '<u2'), ('p', '<i2'), ('t', '<f8')]", "(40,)",
                std::vector<double>(80, 0.0));

@@ -115,7 +115,7 @@ TEST_F(Hdf5Layouts, FilesKnowTheSensorsTheCalibrationAndThePoses) {
   EXPECT_EQ(metavision.cameras[0]->size().value().height, 260);
 }
 
-TEST_F(Hdf5Layouts, DamagedFilesAreReadOrRefused) {
+TEST_F(Hdf5Layouts, DamagedFilesAreReadOrRejected) {
   for (const char* name : {"dsec/events/left/events.h5", "m3ed/desk_data.h5",
                            "m3ed/desk_pose_gt.h5", "mvsec/desk_data.hdf5"}) {
     readDamaged(readBytes(folder_ / name), folder_ / "damaged.h5", "hdf5");

@@ -225,16 +225,16 @@ TEST_F(Aedat4, EachPositionInAFlatBufferIsChecked) {
   const std::string good = eventPacket({{1, 2, 3, 1, {}}});
   ASSERT_EQ(good.size() % 4, 0U);
   const std::string header = headerOf(Packing::kNone, -1, outInfo(streamXml(0, "EVTS", "left")));
-  std::size_t refused = 0;
+  std::size_t rejected = 0;
   // Makes each number of the buffer point beyond the end and before the beginning.
   for (std::size_t at = 0; at + 4 <= good.size(); at += 2) {
     for (const std::uint32_t wrong : {0x7fff'fff0U, 0xffff'fff0U, 0x8000'0000U}) {
       std::string damaged = good;
       std::memcpy(&damaged[at], &wrong, sizeof(wrong));
-      if (errorOfBytes(header + packetBytes(0, damaged)) != "no error") ++refused;
+      if (errorOfBytes(header + packetBytes(0, damaged)) != "no error") ++rejected;
     }
   }
-  EXPECT_GT(refused, 20U);
+  EXPECT_GT(rejected, 20U);
 }
 
 TEST_F(Aedat4, StreamsAreChosenByCameraOutputOrNumber) {
@@ -331,7 +331,7 @@ TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {
   EXPECT_THAT(errorOf([&] { openAedat4({folder()}, {}); }), HasSubstr("cannot be opened"));
 }
 
-TEST_F(Aedat4, DamagedFilesAreReadOrRefused) {
+TEST_F(Aedat4, DamagedFilesAreReadOrRejected) {
   for (const auto compression : {Packing::kNone, Packing::kLz4, Packing::kZstd}) {
     readDamaged(recording(compression, true), file(), "aedat4");
   }

@@ -199,7 +199,7 @@ TEST_F(PropheseeRaw, OtherFilesAreNotTakenForIt) {
   EXPECT_FALSE(looksLikePropheseeRaw(folder() / "absent"));
 }
 
-TEST_F(PropheseeRaw, DamagedFilesAreReadOrRefused) {
+TEST_F(PropheseeRaw, DamagedFilesAreReadOrRejected) {
   std::vector<Event> events = longRecording();
   events.resize(2000);
   for (const RawKind& kind : rawKinds()) {

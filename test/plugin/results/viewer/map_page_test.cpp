@@ -49,7 +49,7 @@ TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
   const PagePoints page(*cloud, 0.01);
   ASSERT_EQ(page.size(), points.size());
   EXPECT_NEAR(page.step_m().x(), 40.0 / 65535, 1e-5);
-  EXPECT_EQ(page.thinned_m(), 0);
+  EXPECT_EQ(page.subsampled_m(), 0);
   // Confidences are 1 to 1000: the range goes from the lowest to the highest percent.
   EXPECT_EQ(page.lowConfidence(), 10);
   EXPECT_EQ(page.highConfidence(), 990);
@@ -82,19 +82,19 @@ TEST(PagePoints, AnyFirstPartCoversTheMap) {
   EXPECT_GE(PagePoints(*cloud, 0.01, 1000).size(), 700U) << "thinned as a surface is";
 }
 
-TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
+TEST(PagePoints, MoreThanTheLimitAreSubsampledToTheBestOfEachCell) {
   std::vector<CloudPoint> points = randomPoints(20000, {0, 0, 0});
   for (std::size_t i = 0; i < points.size(); ++i) points[i].support = 1 + i * 7 % 4;
   const MapCloud::ConstPtr cloud = mapCloudOf(points, 1e-9);
   const PagePoints page(*cloud, 0.01, 1000);
   EXPECT_LE(page.size(), 1000U);
   EXPECT_GE(page.size(), 700U) << "not many fewer than there may be";
-  EXPECT_GT(page.thinned_m(), 0.01);
+  EXPECT_GT(page.subsampled_m(), 0.01);
   // Each cell keeps the points with its highest support, and of these the highest confidence.
   std::map<std::tuple<double, double, double>, std::pair<std::uint32_t, float>> best;
   const auto cell_of = [&](const MapPoint& point) {
     const Eigen::Vector3d cell =
-        ((positionIn(*cloud, point) - page.origin_m()) / page.thinned_m()).array().floor();
+        ((positionIn(*cloud, point) - page.origin_m()) / page.subsampled_m()).array().floor();
     return std::tuple(cell.x(), cell.y(), cell.z());
   };
   for (const MapPoint& point : *cloud) {
@@ -245,7 +245,7 @@ TEST(MapPage, SaysHowManyPointsAreLeftOut) {
     EXPECT_EQ(map["all_points"], 15'000);
     EXPECT_EQ(map["points"], shown.size());
     EXPECT_EQ(shown.size() == 15'000, limit == 15'000) << "as many as there may be";
-    EXPECT_EQ(map["thinned_m"], shown.thinned_m());
+    EXPECT_EQ(map["thinned_m"], shown.subsampled_m());
     EXPECT_FALSE(map.contains("view"));
     std::string bytes;
     for (std::size_t i = 0; i < shown.size(); ++i) shown.at(i).appendTo(bytes);
