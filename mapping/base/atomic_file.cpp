@@ -77,7 +77,7 @@ std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& pat
       std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
   const std::string end = ".partial-" + number + path.extension().string();
   std::string begin = path.stem().string();
-  // Two long names may begin alike: then `trial` tells them apart.
+  // Two long names may begin alike: `trial` makes them different.
   begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
   std::filesystem::path temporary = path;
   temporary.replace_filename(begin + end);

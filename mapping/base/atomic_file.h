@@ -21,7 +21,7 @@ class AtomicFile {
   /// @throws std::runtime_error naming `path` where it is no file name, a folder or a device has
   /// that name, or no file can be made there.
   explicit AtomicFile(const std::filesystem::path& path);
-  /// Without `replace`: removes the temporary file.
+  /// Removes the temporary file if `replace` was not called.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

@@ -50,7 +50,7 @@ struct OptionError : std::invalid_argument {
   std::string key;
   std::string value;
   std::string expected;                 ///< "1 to 1000"
-  std::vector<std::string> other_keys;  ///< Of the same section: the range depends on them.
+  std::vector<std::string> other_keys;  ///< Keys of the same section whose values limit the range.
   std::string sentence;                 ///< The message without the section.
 
  private:
@@ -86,7 +86,7 @@ void requireOption(bool holds, const Name& name, const Value& value, std::string
 struct Allowed {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
-  const char* expected = nullptr;  ///< In words, for errors.
+  const char* expected = nullptr;  ///< The range in words, for errors.
   bool without_lowest = false;     ///< `lowest` itself is not allowed.
   bool without_highest = false;    ///< `highest` itself is not allowed.
   bool or_zero = false;            ///< 0 is allowed, too.

@@ -181,7 +181,7 @@ class TiffCodec {
   explicit TiffCodec(CodecBytes& bytes) {
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
     if (options == nullptr) throw std::bad_alloc();
-    // Nothing is printed where these return 1.
+    // If these functions return 1, libtiff prints nothing.
     TIFFOpenOptionsSetErrorHandlerExtR(options, report, &bytes);
     TIFFOpenOptionsSetWarningHandlerExtR(
         options, [](TIFF*, void*, const char*, const char*, std::va_list) { return 1; }, nullptr);
@@ -314,7 +314,7 @@ std::uint32_t bigEndian(std::string_view bytes, std::size_t at, std::size_t coun
   return number;
 }
 
-/// From the frame's header, the first one of SOF0 to SOF15.
+/// Reads the size from the frame's header, the first of SOF0 to SOF15.
 cv::Size jpegSize(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 9 <= bytes.size() && bytes[at] == '\xFF') {
@@ -384,7 +384,7 @@ std::string encodeTiff(const cv::Mat1f& image) {
       written = written && TIFFSetField(codec.tiff, tag, value) != 0;
     }
     for (int y = 0; written && y < image.rows; ++y) {
-      // In the machine's order of bytes: no row is changed.
+      // The rows have the machine's order of bytes: none is changed.
       written = TIFFWriteScanline(codec.tiff, const_cast<float*>(image[y]),
                                   static_cast<std::uint32_t>(y), 0) >= 0;
     }

@@ -17,7 +17,7 @@ namespace efm {
 /// Something implausible, which does not stop a run: docs/recordings.md has a table of the names.
 struct Warning {
   std::string name;  ///< "clock-overlap"
-  std::string text;  ///< A sentence with the values, and the option or file that would mend it.
+  std::string text;  ///< A sentence with the values, and the option or file that fixes it.
 };
 
 /// Text of a file for an error message: one line, without control characters for the terminal.
@@ -33,7 +33,7 @@ std::string inQuotes(std::string_view text);
 inline constexpr std::string_view kLineBlanks = " \t\r\v\f";
 
 /// Parses the whole text as a number. Real numbers may be infinite or NaN.
-/// @return nothing if the text is no number, or the type cannot hold it.
+/// @return std::nullopt if the text is no number, or the type cannot hold it.
 template <typename Number>
 std::optional<Number> parseNumber(std::string_view text) {
   Number number{};

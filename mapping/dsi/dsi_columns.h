@@ -20,7 +20,7 @@ struct PeakFunctions;
 /// The peak of the DSI in the column of every pixel: images of the view's size. Where whole columns
 /// are stored (`DsiColumns`), which have the other values, there is the confidence alone.
 struct DsiPeaks {
-  cv::Mat1f confidence;  ///< The largest fused value; 0 where nothing voted.
+  cv::Mat1f confidence;  ///< The largest fused value; 0 if nothing voted.
   cv::Mat1i plane;       ///< Its plane; of equals the nearest.
   cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
   cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
@@ -115,14 +115,14 @@ class DsiColumns {
   int planes_ = 0;
   std::vector<std::vector<std::uint8_t>> roots_;  // of the tiles
   std::vector<Column> columns_;
-  cv::Mat1i index_;  // of columns_; -1 where there is none
+  cv::Mat1i index_;  // index in columns_; -1 if there is none
   const kernels::ColumnFunctions* functions_ = nullptr;
 };
 
 /// The result of a sweep for one DSI.
 struct SweptDsi {
   DsiPeaks peaks;
-  DsiColumns columns;  ///< Where asked for.
+  DsiColumns columns;  ///< Filled if asked for.
 };
 
 }  // namespace efm

@@ -33,7 +33,7 @@ void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
 /// cast + outside_view + behind_camera = events x planes.
 struct VoteCounts {
   std::uint64_t cast = 0;
-  std::uint64_t outside_view = 0;   ///< Not all four neighbouring pixels lie inside the view.
+  std::uint64_t outside_view = 0;   ///< Votes that have a neighbouring pixel outside the view.
   std::uint64_t behind_camera = 0;  ///< The plane point is behind the camera that saw the event.
 
   std::uint64_t total() const { return cast + outside_view + behind_camera; }
@@ -64,7 +64,7 @@ bool isAvailable(VotingKernel kernel);
 /// baseline 0.6 to 1, SSE4 2 to 2.2, AVX2 2.2 to 2.6, AVX-512 3.2 to 4.6 (docs/performance.md).
 /// NEON has not been measured: its vectors are as long as SSE4's, and the code is the same.
 VotingKernel fastestOf(const std::vector<VotingKernel>& kernels);
-/// Of `availableKernels`.
+/// Returns the fastest of `availableKernels`.
 VotingKernel fastestKernel();
 
 }  // namespace efm

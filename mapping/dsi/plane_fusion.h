@@ -82,8 +82,8 @@ struct FusionOptions {
 
 /// The numbers of inputs of a plane.
 struct FusionInputs {
-  int cameras = 1;          ///< At least 1.
-  int slots_per_group = 1;  ///< Of each camera; at least 1.
+  int cameras = 1;          ///< Number of cameras, at least 1.
+  int slots_per_group = 1;  ///< Slots of each camera; at least 1.
   int groups = 1;           ///< Each is fused by itself; the fused groups are summed. At least 1.
 };
 
@@ -104,7 +104,7 @@ class PlaneFusion {
   /// Which planes are fused.
   enum class Keep {
     kFusedOnly,
-    kCameras,  ///< Also each camera alone, across time: a plane of memory per camera.
+    kCameras,  ///< Fuses also each camera alone, across time: a plane of memory per camera.
   };
 
   /// @param voxels of a plane or of a tile of it.

@@ -28,25 +28,25 @@ struct CountsBy {
 
 /// What became of an event. Each event has one fate, at the latest when the mapping ends.
 enum class EventFate {
-  // Of the mapping.
+  // Fates in the mapping.
   kUsed,           ///< Voted in at least one keyframe.
   kWithoutPose,    ///< The trajectory has no pose at its time.
-  kOutsideWindow,  ///< In no window that was mapped.
+  kOutsideWindow,  ///< Lies in no window that was mapped.
   kDropped,        ///< Came too late, in a window that was dropped, or of an unselected camera.
   kFiltered,       ///< Removed as noise, with a pose or without.
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
-  kOverBudget,     ///< In a window that was mapped, but not among the events chosen there.
-  // Of the queue, in live operation, before the mapping.
+  kOverBudget,     ///< Lies in a window that was mapped, but was not chosen there.
+  // Fates in the queue of live operation, before the mapping.
   kSubsampled,  ///< Left out by the budget in sensor time.
   kQueueFull,   ///< Dropped because the queue was full.
-  kRejected,    ///< In a packet that contradicts its camera, or over a second ahead of its stream.
+  kRejected,    ///< Its packet contradicts its camera, or it is over a second ahead of its stream.
   kPaused,      ///< Came while map updating was disabled.
   kAfterEnd,    ///< Came after the end of the input.
 };
 
 struct EventFateRow {
   EventFate fate;
-  const char* key;      ///< In report.json.
+  const char* key;      ///< The key in report.json.
   const char* text;     ///< What follows "5.1 %" in a summary.
   bool is_loss = true;  ///< Lost in live operation; the others are what the options ask for.
 };

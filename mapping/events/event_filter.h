@@ -95,7 +95,7 @@ class HotPixelFilter {
   }
   void startPeriod(std::size_t row);
   bool isBusiest(const Event& event);
-  /// In the counts, which have a frame of one silent pixel.
+  /// Returns the index in the counts, which have a frame of one silent pixel.
   std::size_t indexOf(const Event& event) const {
     return (std::size_t{event.y} + 1) * stride_ + event.x + 1;
   }
@@ -159,7 +159,7 @@ class FilteredEvents {
   std::uint64_t insert(EventSpan events) { return waiting_.insert(events); }
   /// The number of events that were not filtered yet.
   std::size_t waiting() const { return waiting_.events.size() - waiting_.begin; }
-  /// Filters the events before `until_ns` and inserts those that remain into `buffer`. No event
+  /// Filters the events before `until_ns` and inserts the remaining events into `buffer`. No event
   /// before `until_ns` may be inserted here afterwards.
   /// @return the number of events that the filter removed.
   std::uint64_t release(std::int64_t until_ns, EventBuffer& buffer);

@@ -104,7 +104,7 @@ EventSpan EventPart::select(PolaritySplit& split) const {
     for (const std::size_t on : {0, 1}) {
       if (split.of[on].size() < sizes[on]) split.of[on].resize(sizes[on]);
     }
-    // Without a branch, which random polarities make unpredictable.
+    // There is no branch here: random polarities would make it unpredictable.
     Event* next[2] = {split.of[0].data(), split.of[1].data()};
     for (const Event& event : all) *next[event.polarity ? 1 : 0]++ = event;
     split.size[0] = sizes[0];

@@ -40,7 +40,7 @@ struct TimeLimits {
 /// The quantity that is equal in the sub-intervals of a window.
 enum class SubintervalSplit {
   kDuration,  ///< Their duration.
-  kCount,     ///< The number of a camera's events in them, to within one.
+  kCount,     ///< Equal numbers of a camera's events, to within one.
 };
 
 /// Which sub-intervals of the cameras are fused with each other, in one slot.
@@ -61,7 +61,7 @@ struct SubintervalOptions {
   int count = 1;  ///< N_s, 1 to 1000; the paper finds 2 to 8 useful. 1: no fusion across time.
   SubintervalSplit split = SubintervalSplit::kDuration;
   SubintervalShuffle shuffle = SubintervalShuffle::kNone;
-  std::uint32_t shuffle_seed = 1;  ///< Of `kRandom`.
+  std::uint32_t shuffle_seed = 1;  ///< The seed of `kRandom`.
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -74,7 +74,7 @@ struct SubintervalOptions {
 };
 
 /// Divides one camera's events of the window [t0, t1) into consecutive, half-open sub-intervals.
-/// With `kCount`, events of the same time may be in two sub-intervals.
+/// Events of the same time may be in two sub-intervals if the split is `kCount`.
 std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_ns,
                                              std::int64_t t1_ns, const SubintervalOptions& options);
 
@@ -143,7 +143,7 @@ struct PolaritySplit {
 /// divide by polarity.
 struct EventPart {
   EventSpan all;                 ///< The sub-interval's events.
-  std::optional<bool> polarity;  ///< Of the part's events; not given: both polarities.
+  std::optional<bool> polarity;  ///< The polarity of the part's events; std::nullopt: both.
   std::size_t subinterval = 0;   ///< Index among the sub-intervals of all slices.
 
   /// The part's events in their order: a view of `all`, or, with a polarity, of `split`.

@@ -191,7 +191,7 @@ Eigen::Vector2d LensInverse::invertRadtan(const Eigen::Vector2d& distorted,
     const Eigen::Vector2d ray = newton(distorted, near);
     if (!std::isnan(ray.x())) return ray;
   }
-  // At the end of the branch itself the Jacobian has no inverse.
+  // The Jacobian has no inverse at the very end of the branch.
   const double rho = std::min(inverse_.guess(r), 0.99 * radial_.maxRho());
   return newton(distorted, rho / r * distorted);
 }

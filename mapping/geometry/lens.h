@@ -72,7 +72,7 @@ class LensInverse {
   explicit LensInverse(const CameraModel& model);
 
   /// (X/Z, Y/Z) of the ray through a raw pixel, frame `cam`. The model projects it back to the
-  /// pixel within 1e-6 pixels. Not a number (both) where the pixel has no ray.
+  /// pixel within 1e-6 pixels. Both are NaN if the pixel has no ray.
   /// @param near a ray near it, where one is known: saves half of the time.
   Eigen::Vector2d rayThrough(double x, double y, const Eigen::Vector2d& near = noRay()) const;
   static Eigen::Vector2d noRay() {

@@ -32,7 +32,7 @@ struct DepthPlanesOptions {
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
-    // Not finite and not positive depths first: `validate` has narrower limits.
+    // Depths that are not finite or not positive come first: `validate` has narrower limits.
     visit("min_depth_m", self.min_depth_m,
           Allowed::above(0, Allowed::kFinite, "finite and above 0"));
     visit("max_depth_m", self.max_depth_m,

@@ -63,7 +63,7 @@ struct Rig {
   std::vector<RigCamera> cameras;
 };
 
-/// Whether a camera is one of those that are chosen by their indices; empty: all are.
+/// Returns whether a camera is among the selected indices. An empty list selects all cameras.
 bool isSelected(int camera, const std::vector<int>& selection);
 /// The indices of the cameras that are chosen, in the order of the selection; empty: all of the
 /// rig.

@@ -46,7 +46,7 @@ std::string_view takeDigits(std::string_view& text) {
   return digits;
 }
 
-/// Splits unsigned decimal text; nothing where it is not a number from end to end.
+/// Splits unsigned decimal text. Returns std::nullopt unless all of it is a number.
 std::optional<DecimalDigits> splitDecimal(std::string_view text) {
   DecimalDigits digits;
   digits.integer = takeDigits(text);

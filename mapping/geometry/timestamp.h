@@ -23,7 +23,7 @@ inline constexpr std::int64_t kEndOfTimeNs = kMaxTimeNs / 2;
 
 /// Parses decimal seconds ("12", "-0.5", "1.5e-3", "1700000000.123456789") to nanoseconds without
 /// passing through a double. Digits past the ninth decimal are rounded to the nearest nanosecond.
-/// @return nothing where the text is not a number from end to end or does not fit 64 bits.
+/// @return std::nullopt unless all of the text is a number that fits into 64 bits.
 std::optional<std::int64_t> parseSeconds(std::string_view text);
 
 /// The same for a decimal number of a unit of 10^`exponent` seconds: -6 for microseconds.

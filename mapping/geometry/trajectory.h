@@ -69,8 +69,8 @@ class Trajectory {
   /// May remove poses that times from `t_ns` on do not need; cost is constant on average.
   void forgetBefore(std::int64_t t_ns);
 
-  /// T_world_rig; nothing outside the recorded times and inside a gap. At a recorded time always
-  /// the recorded pose.
+  /// Returns T_world_rig, or std::nullopt outside the recorded times and inside a gap. At a
+  /// recorded time always the recorded pose.
   std::optional<Rigid3> poseAt(std::int64_t t_ns) const;
 
   /// The segment that contains `t_ns`; at a recorded time the one that begins there, if there is

@@ -102,8 +102,8 @@ const FusionFunctions& fusionFunctions();
 struct PeakArrays {
   float* best = nullptr;          ///< The largest value; of equals the first.
   std::int32_t* plane = nullptr;  ///< Its plane.
-  float* before = nullptr;        ///< The value one plane before it; -1 where there was none.
-  float* after = nullptr;         ///< The value one plane after it; -1 where there was none.
+  float* before = nullptr;        ///< The value one plane before it; -1 if there is none.
+  float* after = nullptr;         ///< The value one plane after it; -1 if there is none.
   float* previous = nullptr;      ///< The value of the plane added last.
 };
 

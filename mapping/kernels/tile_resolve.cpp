@@ -89,7 +89,7 @@ class ColumnResolver {
     units_ = hn::Add(units_, hn::And(within_, sum));
     return floatsOf(sum);
   }
-  /// Of all pixels so far.
+  /// The sum over all pixels so far.
   std::uint64_t units() const { return sumOfLanes(Unsigned(), units_); }
 
  private:
@@ -177,7 +177,7 @@ void addAll(std::uint64_t* first, std::uint64_t* second, int width, int height, 
   clearLast(second, width, height);
 }
 
-/// For each line of a row of pixels a byte, not zero where one of their cells may have votes: cells
+/// A byte for each line of a row of pixels; not zero if one of its cells may have votes: cells
 /// of the rows above and below, of the line and of the next one.
 HWY_INLINE std::uint64_t linesWithVotes(const std::uint8_t* dirty, int row) {
   constexpr int kLinesInRow = kTileCells / kLineCells;

@@ -235,8 +235,8 @@ FullCell* voteBy(const MovingRays& rays, float to_plane, const CellWindow& windo
   VoteBatch batch;
   const VoteEncoder encoder(rays, to_plane, window);
   const std::size_t lanes = hn::Lanes(Floats());
-  // In two steps: vectors write a batch to memory, then votes are added one by one. In one loop the
-  // compiler extracts lanes from registers, which costs more.
+  // There are two steps: vectors write a batch to memory, then votes are added one by one. In one
+  // loop the compiler extracts lanes from registers, which costs more.
   for (std::size_t begin = 0; begin < rays.size; begin += VoteBatch::kSize) {
     const std::size_t size = std::min(rays.size - begin, VoteBatch::kSize);
     for (std::size_t i = 0; i < size; i += lanes) {

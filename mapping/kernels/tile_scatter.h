@@ -21,8 +21,8 @@ namespace efm::kernels {
 // copied to a list and set to zero, before any sum can leave its field.
 
 inline constexpr int kTileCells = 64;     ///< Cells on a side of a tile at most; a row's stride.
-inline constexpr int kFractionBits = 12;  ///< Of a coordinate within its cell.
-inline constexpr int kWeightBits = 10;    ///< Of a weight; a vote has 2^kWeightBits units.
+inline constexpr int kFractionBits = 12;  ///< Bits of a coordinate within its cell.
+inline constexpr int kWeightBits = 10;    ///< Bits of a weight; a vote has 2^kWeightBits units.
 inline constexpr int kVotesPerCell = 32;  ///< A full cell has at least this number of votes.
 
 /// The sums of a cell's weights by pixel, in units.
@@ -55,11 +55,11 @@ struct BinnedRay {
 
 /// The rays of bins that a tile needs.
 struct GatherRequest {
-  float to_first = 0, to_last = 0;  ///< From the anchor plane to the group's first and last, 1/m.
+  float to_first = 0, to_last = 0;  ///< From the anchor plane to the first and last plane, 1/m.
   float to_pixels = 0;  ///< From the anchor plane to the plane of the gathered pixels, 1/m.
   float moving = 1;     ///< 1; or 0 on a single plane, where rays stand still.
   float left = 0, right = 0, top = 0, bottom = 0;  ///< The tile's cells, pixels.
-  float origin_x = 0, origin_y = 0;                ///< Of the gathered coordinates, pixels.
+  float origin_x = 0, origin_y = 0;                ///< Origin of the gathered coordinates, pixels.
 };
 
 /// Rays that a tile may see in a group of planes, as four arrays: their pixels on one plane and
@@ -80,7 +80,7 @@ inline constexpr int kLines = kTileCells * (kTileCells + 2) / kLineCells;
 /// A tile's cells in rows of kTileCells, with two rows more than votes need.
 struct CellBuffer {
   std::uint64_t* cells = nullptr;
-  /// Of kLines lines: 1 where a line may have votes, else 0. Null: votes are not marked.
+  /// A flag for each of kLines lines: 1 if it may have votes, else 0. Null: votes are not marked.
   std::uint8_t* dirty = nullptr;
 };
 
@@ -94,7 +94,7 @@ struct CellWindow {
 
 /// A copy of a full cell.
 struct FullCell {
-  std::uint32_t index = 0;  ///< In the tile.
+  std::uint32_t index = 0;  ///< Index in the tile.
   std::uint64_t sums = 0;
 };
 
@@ -117,7 +117,7 @@ const TileFunctions& tileFunctions(VotingKernel kernel);
 /// Vectors may read, and write back, this number of values past the end of a sum.
 inline constexpr std::size_t kSumPadding = 16;
 
-/// From the cells of a tile to its ray densities: the bilinear votes of Ghosh and Gallego 2022,
+/// Turns the cells of a tile into its ray densities: the bilinear votes of Ghosh and Gallego 2022,
 /// Eq. 2. A tile's pixels lie right of and below its first cells; it has at most kTileCells - 1 on
 /// a side. All cells are zero afterwards.
 struct ResolveFunctions {

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kGridSide = 3;
 static_assert(kGridSide * kGridSide == GridVotes::kRays);
 
-/// With a change of speed by this fraction, parabolas err by a percent.
+/// If the speed changes by this fraction, parabolas err by a percent.
 constexpr double kEvenChange = 0.1;
 
 bool isNear(const ReferenceView& view, double x, double y) {
@@ -21,11 +21,11 @@ bool isNear(const ReferenceView& view, double x, double y) {
 
 /// Squares of the largest steps of votes, in pixels per half of the interval.
 struct MaxSteps {
-  double first = 0;   ///< From the start to the middle.
-  double second = 0;  ///< From the middle to the end.
+  double first = 0;   ///< Motion from the start to the middle.
+  double second = 0;  ///< Motion from the middle to the end.
   double start = 0;   ///< The speed at the start and at the end.
   double end = 0;
-  double change = 0;  ///< From the first to the second half.
+  double change = 0;  ///< Change from the first to the second half.
   bool any = false;
 
   void add(const Eigen::Vector2d& first_half, const Eigen::Vector2d& second_half) {
@@ -233,7 +233,7 @@ struct ProjectedRay {
 /// Ghosh and Gallego 2022, Eq. 4, with Z at infinity. The principal point is added last, so that
 /// errors of rounding grow with the distance from it.
 ///
-/// In floats, coordinates are at most 3e-4 pixels off at HD, and any x86-64 processor computes four
+/// Float coordinates are at most 3e-4 pixels off at HD, and any x86-64 processor computes four
 /// rays at once.
 class InfinityHomography {
  public:

@@ -51,7 +51,7 @@ class VoteGrid {
 class VoteDisplacement {
  public:
   /// @param votes at the start, in the middle and at the end.
-  /// @return nothing where a vote comes or goes between the three times.
+  /// @return std::nullopt if a vote appears or disappears between the three times.
   static std::optional<VoteDisplacement> measure(std::int64_t start_ns, std::int64_t end_ns,
                                                  const std::array<const GridVotes*, 3>& votes);
 

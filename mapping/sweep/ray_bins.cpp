@@ -14,7 +14,7 @@ namespace {
 /// Side of a bin, and the distance that packets of one `RayBins` may be apart. Smaller bins are
 /// more, larger bins have more rays that a tile does not see.
 constexpr double kBin_px = 16;
-/// Of a bin on average. Fewer rays do not fill vectors.
+/// Average number of rays of a bin. Fewer rays do not fill vectors.
 constexpr double kRaysPerBin = 8;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -178,7 +178,7 @@ RayBins::Axis RayBins::axisOf(Eigen::Index axis, int pixels, double principal,
   }
   const Range range{static_cast<float>(std::max(min, in_view_min)),
                     static_cast<float>(std::min(max, in_view_max))};
-  // As many bins along either axis as rays fill on average.
+  // The number of bins along either axis is the number that the rays fill on average.
   const double bins = std::max(1.0, std::sqrt(static_cast<double>(rays) / kRaysPerBin));
   const double width = std::max(double{range.max - range.min}, 1.0);
   const double side = std::max(kBin_px / widening, width / bins);
@@ -260,7 +260,8 @@ RayBins::Footprint RayBins::footprintOn(const PlaneRange& planes) const {
   return footprint;
 }
 
-/// Rays run straight: on a plane between the two ends, pixels are weighted means of those there.
+/// Rays run straight: on a plane between the two ends, pixels are weighted means of the pixels
+/// there.
 RayBins::Footprint::Side RayBins::sideOf(const Axis& axis, const PlaneRange& planes) const {
   const auto pixelsOn = [&](std::size_t bin, double inverse_depth) {
     const Range& anchor = axis.on_anchor[bin];

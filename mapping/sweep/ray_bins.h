@@ -61,8 +61,8 @@ class RayBins {
    private:
     friend class RayBins;
 
-    /// The pixels of the bins along one axis, kept so that those that meet an interval are found by
-    /// search.
+    /// The pixels of the bins along one axis, kept so that the bins that meet an interval are found
+    /// by search.
     struct Side {
       std::vector<float> max_until;  // of the bins up to this one
       std::vector<float> min_from;   // of this bin and those after it
@@ -109,7 +109,8 @@ class RayBins {
     // The pixels of each bin's rays on the anchor plane, and on the plane at the other end.
     std::vector<Range> on_anchor, on_other;
   };
-  /// Of a packet's rays, from the anchor plane to the other end: x_other = scale x + offset.
+  /// Transfer of a packet's rays from the anchor plane to the other end: x_other = scale x +
+  /// offset.
   struct Transfer {
     double scale, offset;
   };
@@ -165,7 +166,7 @@ class RayIndex {
   /// those of another plane. Thread-safe.
   void gatherOn(int plane, std::size_t group, std::size_t input, const TileCells& tile,
                 TileRays& rays) const;
-  /// From the plane where moving rays have their pixels to a plane, 1/m.
+  /// Distance from the plane where moving rays have their pixels to a plane, 1/m.
   double fromPixels(int plane) const {
     return 1 / planes_.depth(plane) - RayBins::pixelPlane(planes_);
   }

@@ -41,13 +41,13 @@ class DsiSink {
 };
 
 struct SweepRequest {
-  bool camera_peaks = false;  ///< Also the peaks of each camera alone, fused across time.
+  bool camera_peaks = false;  ///< Find also the peaks of each camera alone, fused across time.
   DsiSink* sink = nullptr;    ///< Receives the whole fused DSI where given; not owned.
   /// The groups of each camera's slots, one after the other: each group is fused by itself, and the
   /// fused groups are summed. Divides the number of slots.
   int groups = 1;
-  /// Also columns of the pixels whose confidence is above its mean in a Gaussian window of this
-  /// side: odd, at least 3. The peaks then have the confidence alone. 0: no columns.
+  /// Return also the columns of the pixels whose confidence is above its mean in a Gaussian window
+  /// of this side: odd, at least 3. The peaks then have the confidence alone. 0: no columns.
   int column_window = 0;
 };
 

@@ -91,7 +91,7 @@ std::uint64_t TileAccumulator::addFullCells(float* density) const {
   std::uint64_t units = 0;
   for (std::size_t i = 0; i < full_cells_; ++i) {
     const kernels::CellSums sums = kernels::unpack(full_[i].sums);
-    // Of the pixel to the lower right.
+    // Cell of the pixel to the lower right.
     const int x = static_cast<int>(full_[i].index) % kStride;
     const int y = static_cast<int>(full_[i].index) / kStride;
     const auto add = [&](int column, int row, std::uint32_t weight) {

@@ -29,9 +29,9 @@ struct TileCells {
   TileCells(const cv::Rect& tile, const ReferenceView& view);
 
   cv::Rect tile;     ///< Pixels.
-  cv::Rect all;      ///< Also cells outside the view, which a pixel at its border has.
+  cv::Rect all;      ///< All cells, also outside the view: a pixel at its border has such cells.
   cv::Rect in_view;  ///< Those of `all` that are inside the view.
-  cv::Point origin;  ///< Of the coordinates of the tile's rays, pixels.
+  cv::Point origin;  ///< Origin of the coordinates of the tile's rays, pixels.
 };
 
 /// The rays that one tile sees of one input: those of a group of planes, and after them those of
