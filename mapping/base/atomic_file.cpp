@@ -21,9 +21,9 @@ std::runtime_error cannotWrite(const std::filesystem::path& path, const std::str
   return std::runtime_error("cannot write '" + path.string() + "': " + why);
 }
 
-/// The path itself, or the file at the end of its symbolic links.
+/// Returns the path itself, or the target of its symbolic links.
 std::filesystem::path replaceableFile(const std::filesystem::path& path) {
-  constexpr int kMaxLinks = 40;  // as Linux has it
+  constexpr int kMaxLinks = 40;  // the limit of Linux
   const auto reject = [&](const std::string& why) { return cannotWrite(path, why); };
   if (path.empty()) throw reject("expected the name of a file");
   std::error_code error;
@@ -77,7 +77,7 @@ std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& pat
       std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
   const std::string end = ".partial-" + number + path.extension().string();
   std::string begin = path.stem().string();
-  // Two long names may begin alike: `trial` makes them different.
+  // Two long names may begin with the same characters: then `trial` makes them different.
   begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
   std::filesystem::path temporary = path;
   temporary.replace_filename(begin + end);
@@ -104,13 +104,13 @@ void AtomicFile::fill(
 void AtomicFile::replace(DiskSync sync) {
   if (sync == DiskSync::kNow) syncToDisk(temporary_);
   std::filesystem::rename(temporary_, path_);
-  temporary_.clear();  // the name may be another process's file from now on
+  temporary_.clear();  // from now on another process may use this name
   if (sync == DiskSync::kNow) syncToDisk(path_.has_parent_path() ? path_.parent_path() : ".");
 }
 
 void syncToDisk(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return;  // a folder that may be written to, but not read
+  if (file < 0) return;  // the folder may be writable, but not readable
   const int error = ::fsync(file) == 0 ? 0 : errno;
   ::close(file);
   if (error == 0 || error == EINVAL || error == ENOSYS || error == EOPNOTSUPP) return;
@@ -157,7 +157,7 @@ NewFolder::NewFolder(fs::path folder) : folder_(std::move(folder)) {
   const fs::path parent = folder_.parent_path();
   fs::create_directories(parent, error);
   if (error) throw std::runtime_error(parent.string() + ": cannot be made: " + error.message());
-  constexpr std::size_t kMostOfName = NAME_MAX - 40;  // the rest is room for the numbers
+  constexpr std::size_t kMostOfName = NAME_MAX - 40;  // the other 40 characters are for the numbers
   const std::string name = "." + folder_.filename().string().substr(0, kMostOfName) +
                            ".unfinished-" + std::to_string(getpid());
   for (int trial = 0;; ++trial) {

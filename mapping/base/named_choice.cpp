@@ -16,7 +16,7 @@ std::string folded(std::string_view name) {
   return text;
 }
 
-/// Damerau and Levenshtein's distance, where no letter is edited twice.
+/// Returns the distance of Damerau and Levenshtein, without editing a letter twice.
 std::size_t editDistance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before_last;
   std::vector<std::size_t> last(b.size() + 1);

@@ -9,24 +9,24 @@
 
 namespace efm {
 
-/// The known name that was probably meant by a mistyped one: the one with the fewest letters
-/// missing, added, replaced or swapped with the next one; the first of several. At most a third of
-/// the longer name's letters, and at least one, may differ. Capitals, '-' and '_' do not count.
+/// Returns the known name nearest to a mistyped one: with the fewest letters missing, added,
+/// replaced or swapped with the next letter; the first of equal ones. At most a third of the longer
+/// name's letters may differ, but always one. Upper and lower case, '-' and '_' do not count.
 std::optional<std::string> nearestName(std::string_view typed,
                                        const std::vector<std::string>& known);
 
-/// What an error about an unknown name says of the known ones: "did you mean rms? One of: min, rms"
-/// or "expected one of min, rms". A long list is left out where one of its names is near.
+/// Returns the part of an error message that lists the known names: "did you mean rms? One of: min,
+/// rms" or "expected one of min, rms". Leaves out a list of more than 8 names if one is near.
 std::string expectedName(std::string_view typed, const std::vector<std::string>& known);
 
-/// One enumerator and its name in option files and messages.
+/// An enumerator and its name in option files and messages.
 template <typename Enum>
 struct NamedChoice {
   Enum value;
   std::string_view name;
 };
 
-/// The name of an enumerator. `table` has all of them.
+/// Returns the name of an enumerator. `table` has all enumerators.
 template <typename Enum, std::size_t N>
 std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
   for (const auto& choice : table) {
@@ -35,7 +35,7 @@ std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
   throw std::logic_error("an enumerator has no name");
 }
 
-/// The enumerator with a name.
+/// Returns the enumerator with a name. @throws std::invalid_argument if the name is unknown.
 template <typename Enum, std::size_t N>
 Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   std::vector<std::string> known;

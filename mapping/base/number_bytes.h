@@ -15,7 +15,7 @@
 
 namespace efm {
 
-/// A number from its bytes, on any machine.
+/// Returns a number from its bytes, on any machine.
 template <typename Number>
 Number numberFrom(const void* bytes, bool big_endian) {
   static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
@@ -85,7 +85,7 @@ inline bool isReal(NumberType type) {
   return type == NumberType::kFloat32 || type == NumberType::kFloat64;
 }
 
-/// The type of a kind and a size: 'i' is whole with a sign, 'u' without one, 'f' is real.
+/// Returns the type of a kind and a size: 'i' signed integer, 'u' unsigned integer, 'f' real.
 /// @return std::nullopt if there is no such type.
 inline std::optional<NumberType> numberTypeOf(char kind, std::size_t bytes) {
   for (int k = 0; k <= static_cast<int>(NumberType::kFloat64); ++k) {
@@ -101,7 +101,7 @@ inline std::optional<NumberType> numberTypeOf(char kind, std::size_t bytes) {
   return std::nullopt;
 }
 
-/// A number from its `sizeOf(type)` bytes.
+/// Returns a number from its `sizeOf(type)` bytes.
 inline double numberAt(const char* at, NumberType type, bool big_endian) {
   return withNumberOf(type, [&](auto zero) {
     return static_cast<double>(numberFrom<decltype(zero)>(at, big_endian));
@@ -111,13 +111,13 @@ inline double numberAt(const char* at, NumberType type, bool big_endian) {
 /// Numbers in memory at equal distances: a list, a column of a matrix, or a field of records.
 struct Column {
   const char* first = nullptr;
-  std::size_t stride = 0;  ///< Bytes from a number to the next one.
+  std::size_t stride = 0;  ///< Bytes from a number to the next number.
   NumberType type = NumberType::kFloat64;
   bool big_endian = false;
 
-  /// Calls `take(i, number)` for i from 0 to count - 1, up to the first number for which it returns
-  /// false. The number has the type of the file.
-  /// @return the first i for which it returned false; `count` if there was none.
+  /// Calls `take(i, number)` for i from 0 to count - 1, until it returns false. The number has the
+  /// type of the file.
+  /// @return the first i for which `take` returned false; `count` if it always returned true.
   template <typename Take>
   std::size_t forEach(std::size_t count, const Take& take) const {
     return withNumberOf(type, [&](auto zero) {
@@ -131,13 +131,13 @@ struct Column {
   double number(std::size_t i) const { return numberAt(first + i * stride, type, big_endian); }
 };
 
-/// Reads values from bytes one after the other. A value beyond the end is a std::runtime_error that
-/// says how many bytes are missing. Owns nothing.
+/// Reader of consecutive values from bytes; owns nothing. If a value reaches beyond the end, it
+/// throws a std::runtime_error that says how many bytes are missing.
 class ByteReader {
  public:
   ByteReader(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
 
-  /// Values are at multiples of their size from here on, as in CDR.
+  /// Aligns the next values to multiples of their size, counted from here, as in CDR.
   void alignFromHere() {
     origin_ = position_;
     aligned_ = true;
@@ -157,7 +157,7 @@ class ByteReader {
     position_ += size;
     return data_ + position_ - size;
   }
-  /// Bytes as text.
+  /// Returns the next bytes as text.
   std::string_view text(std::size_t size) {
     return {reinterpret_cast<const char*>(take(size)), size};
   }

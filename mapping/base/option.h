@@ -19,7 +19,7 @@ namespace efm {
 /// Section and key of an option: ("dsi", "num_planes").
 using OptionId = std::pair<std::string, std::string>;
 
-/// What an error calls a value. Most code knows no section.
+/// Name of a value in an error message. Most code does not know the section.
 struct OptionName {
   template <typename Text, typename = std::enable_if_t<std::is_convertible_v<Text, std::string>>>
   OptionName(const Text& name) : key(name) {}
@@ -29,10 +29,10 @@ struct OptionName {
 
   std::string section;
   std::string key;
-  std::string remark;  ///< Follows the key: " (how many)".
+  std::string remark;  ///< Text after the key: " (how many)".
 };
 
-/// A value is out of range: "key = value: must be …", behind "[section] " if it is known.
+/// Error of a value out of range: "key = value: must be …", after "[section] " if it is known.
 struct OptionError : std::invalid_argument {
   /// @param others keys of the same section, if the range depends on their values.
   OptionError(const OptionName& name, const std::string& wrong, const std::string& range,
@@ -50,7 +50,7 @@ struct OptionError : std::invalid_argument {
   std::string key;
   std::string value;
   std::string expected;                 ///< "1 to 1000"
-  std::vector<std::string> other_keys;  ///< Keys of the same section whose values limit the range.
+  std::vector<std::string> other_keys;  ///< Keys of the same section: the range depends on them.
   std::string sentence;                 ///< The message without the section.
 
  private:
@@ -60,7 +60,7 @@ struct OptionError : std::invalid_argument {
   }
 };
 
-/// An error that options may cause: the text names them, as "[section] key".
+/// An error that options may cause. The text names the options as "[section] key".
 struct OptionHint : std::invalid_argument {
   OptionHint(const std::string& text, std::vector<OptionId> named = {})
       : std::invalid_argument(text), options(std::move(named)) {}
@@ -70,13 +70,13 @@ struct OptionHint : std::invalid_argument {
 
 /// Rejects an option whose value is out of range.
 /// @param holds the condition of a valid value, so that NaN is rejected too.
-/// @param others as for OptionError.
+/// @param others keys of the same section, if the range depends on their values.
 /// @throws OptionError.
 template <typename Name, typename Value>
 void requireOption(bool holds, const Name& name, const Value& value, std::string_view expected,
                    std::initializer_list<const char*> others = {}) {
   if (holds) return;
-  NumberText text(15);  // as typed: 0.1, not 0.10000000000000001
+  NumberText text(15);  // as the user types it: 0.1, not 0.10000000000000001
   text << value;
   throw OptionError(OptionName(name), text.str(), std::string(expected),
                     {others.begin(), others.end()});
@@ -86,12 +86,12 @@ void requireOption(bool holds, const Name& name, const Value& value, std::string
 struct Allowed {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
-  const char* expected = nullptr;  ///< The range in words, for errors.
+  const char* expected = nullptr;  ///< The range as text, for errors.
   bool without_lowest = false;     ///< `lowest` itself is not allowed.
   bool without_highest = false;    ///< `highest` itself is not allowed.
   bool or_zero = false;            ///< 0 is allowed, too.
   bool only_odd = false;
-  double unit = 1;       ///< The field's value for 1 in an option file: limits are in files' units.
+  double unit = 1;  ///< The field's value for 1 in an option file. Limits have the file's unit.
   bool in_files = true;  ///< false: no option file has this key.
 
   static Allowed from(double lowest, double highest, const char* expected) {
@@ -133,7 +133,7 @@ struct Allowed {
   }
 };
 
-/// An options struct has one line for each option, in the order of the option files:
+/// A check of the ranges. An options struct has one line per option, in the order of option files:
 ///
 ///     template <typename Self, typename Visit>
 ///     static void fields(Self& self, Visit&& visit) {
@@ -142,7 +142,7 @@ struct Allowed {
 ///       visit(self.points);                          // a struct with lines of its own
 ///     }
 ///
-/// What reads, checks, sets and lists options visits these lines. This visitor checks the ranges.
+/// The code that reads, checks, sets and lists options visits these lines, as this struct does.
 struct OptionCheck {
   template <typename Value>
   void operator()(const char* key, const Value& value, const Allowed& allowed = {}) const {
@@ -163,7 +163,7 @@ struct OptionCheck {
   }
 };
 
-/// @throws OptionError at the first field whose value is out of range.
+/// Checks all fields. @throws OptionError at the first field whose value is out of range.
 template <typename Options>
 void requireFields(const Options& options) {
   Options::fields(options, OptionCheck());

@@ -26,8 +26,8 @@ namespace {
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 26U;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30U;
 
-/// Rejects what only a damaged header says, before memory is taken for it. No usual compression
-/// makes a file more than 4096 times smaller.
+/// Rejects a size that only a damaged header can have, before memory is allocated for it. No usual
+/// compression makes a file more than 4096 times smaller.
 void requireBelievable(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_per_row,
                        std::size_t file_size) {
   constexpr std::uint64_t kAlways = std::uint64_t{1} << 24U;
@@ -40,8 +40,8 @@ void requireBelievable(std::uint64_t width, std::uint64_t height, std::uint64_t 
   }
 }
 
-/// The bytes that libpng or libtiff reads, if there are any, else those that it writes, and the
-/// first error that it reported.
+/// Input and output of libpng or libtiff: the bytes that the library reads, or, if there are none,
+/// the bytes that it writes. Also the first error that it reported.
 struct CodecBytes {
   std::string_view input;
   std::string output;
@@ -49,7 +49,7 @@ struct CodecBytes {
   char error[200] = "";
 
   std::string_view content() const { return input.empty() ? output : input; }
-  /// @return how many bytes there were.
+  /// @return the number of bytes that were read; less than `count` at the end.
   std::size_t take(void* to, std::size_t count) {
     count = std::min(count, content().size() - std::min(content().size(), at));
     if (count > 0) std::memcpy(to, content().data() + at, count);
@@ -59,7 +59,7 @@ struct CodecBytes {
   bool put(const void* from, std::size_t count) {
     try {
       output.resize(std::max(output.size(), at + count));
-    } catch (const std::exception&) {  // must not pass through C
+    } catch (const std::exception&) {  // an exception must not pass through C
       return false;
     }
     std::memcpy(output.data() + at, from, count);
@@ -100,7 +100,7 @@ class PngCodec {
   PngCodec(const PngCodec&) = delete;
   PngCodec& operator=(const PngCodec&) = delete;
 
-  /// libpng leaves a failed call by longjmp: `calls` must not have objects with destructors.
+  /// Returns false after a longjmp of libpng: `calls` must not have objects with destructors.
   template <typename Calls>
   bool succeeds(const Calls& calls) {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -181,7 +181,7 @@ class TiffCodec {
   explicit TiffCodec(CodecBytes& bytes) {
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
     if (options == nullptr) throw std::bad_alloc();
-    // If these functions return 1, libtiff prints nothing.
+    // The library prints nothing if these handlers return 1.
     TIFFOpenOptionsSetErrorHandlerExtR(options, report, &bytes);
     TIFFOpenOptionsSetWarningHandlerExtR(
         options, [](TIFF*, void*, const char*, const char*, std::va_list) { return 1; }, nullptr);
@@ -209,7 +209,7 @@ class TiffCodec {
   TiffCodec(const TiffCodec&) = delete;
   TiffCodec& operator=(const TiffCodec&) = delete;
 
-  /// The value of a tag, its default, or 0.
+  /// Returns the value of a tag; if it is missing, its default; without a default, 0.
   template <typename Number>
   Number tag(std::uint32_t name) const {
     Number value = 0;
@@ -252,15 +252,15 @@ bool readTiles(TIFF* tiff, cv::Size size, cv::Mat& picture) {
   return true;
 }
 
-/// Turns the stored image as TIFF's orientation, 1 to 8, says.
+/// Turns the stored image upright. @param orientation 1 to 8, as in TIFF.
 void makeUpright(int orientation, cv::Mat& picture) {
-  constexpr int kFlips[] = {1, -1, 0};  // of 2 to 4 and 6 to 8, for cv::flip
+  constexpr int kFlips[] = {1, -1, 0};  // for cv::flip, of orientations 2 to 4 and 6 to 8
   if (orientation > 4) cv::transpose(picture, picture);
   const int turn = (orientation - 1) % 4;
   if (turn > 0) cv::flip(picture, picture, kFlips[turn - 1]);
 }
 
-/// The depth of a matrix of such samples; below 0: none.
+/// Returns OpenCV's depth for samples of a TIFF (CV_8U …), or -1 if there is none.
 int depthOf(int bits, int format) {
   if (format == SAMPLEFORMAT_UINT) return bits == 8 ? CV_8U : bits == 16 ? CV_16U : -1;
   if (format == SAMPLEFORMAT_IEEEFP) return bits == 32 ? CV_32F : bits == 64 ? CV_64F : -1;
@@ -305,7 +305,7 @@ cv::Mat decodeTiff(std::string_view input) {
   return picture;
 }
 
-/// Two or four bytes from `at` on, the first one the highest.
+/// Returns the number in `count` (2 or 4) bytes from `at` on, the highest byte first.
 std::uint32_t bigEndian(std::string_view bytes, std::size_t at, std::size_t count) {
   std::uint32_t number = 0;
   for (const char byte : bytes.substr(at, count)) {
@@ -314,7 +314,7 @@ std::uint32_t bigEndian(std::string_view bytes, std::size_t at, std::size_t coun
   return number;
 }
 
-/// Reads the size from the frame's header, the first of SOF0 to SOF15.
+/// Returns the size in the frame header: the first of the markers SOF0 to SOF15.
 cv::Size jpegSize(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 9 <= bytes.size() && bytes[at] == '\xFF') {
@@ -384,7 +384,7 @@ std::string encodeTiff(const cv::Mat1f& image) {
       written = written && TIFFSetField(codec.tiff, tag, value) != 0;
     }
     for (int y = 0; written && y < image.rows; ++y) {
-      // The rows have the machine's order of bytes: none is changed.
+      // libtiff writes floats in the machine's byte order, so it changes no row.
       written = TIFFWriteScanline(codec.tiff, const_cast<float*>(image[y]),
                                   static_cast<std::uint32_t>(y), 0) >= 0;
     }
