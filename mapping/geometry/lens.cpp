@@ -19,8 +19,8 @@ double valueOf(const Polynomial& polynomial, double s) {
   return value;
 }
 
-/// The places in (0, end) where the polynomial changes its sign, ascending. Between two of its
-/// extremes it does so once at most.
+/// Returns the places in (0, end) where the polynomial changes its sign, ascending. Between two
+/// neighbouring extremes there is at most one sign change.
 std::vector<double> signChanges(const Polynomial& polynomial, double end) {
   if (polynomial.size() < 2) return {};
   Polynomial derivative;
@@ -80,11 +80,11 @@ double RadialInverse::at(double r) const {
   double rho = guess(r);
   rho -= (distortion_.rAt(rho) - r) / distortion_.slopeAt(rho * rho);
   const bool found = rho >= rho_[node] && rho <= rho_[node + 1] &&
-                     std::abs(distortion_.rAt(rho) - r) <= 1e-14 * r;  // by far the most
+                     std::abs(distortion_.rAt(rho) - r) <= 1e-14 * r;  // true for almost all r
   return found ? rho : solve(r, rho_[node], rho_[node + 1], guess(r));
 }
 
-/// Newton's method, and bisection where it would leave the interval, in which r grows with rho.
+/// Solves rAt(rho) = r in [low, high], where r grows with rho. Bisects if a Newton step leaves it.
 double RadialInverse::solve(double r, double low, double high, double start) const {
   constexpr int kMaxSteps = 100;
   double rho = start;
@@ -101,7 +101,7 @@ double RadialInverse::solve(double r, double low, double high, double start) con
 
 namespace {
 
-/// A longer ray is as good as perpendicular to the optical axis.
+/// A longer ray is almost perpendicular to the optical axis.
 constexpr double kMaxRay = 1e4;
 constexpr double kMaxErrorPx = 1e-6;
 
@@ -123,7 +123,7 @@ RadialDistortion radialOf(const CameraModel& model) {
   return {{}, kMaxRay};
 }
 
-/// Distance of the farthest corner from the principal point, in units of the distorted ray.
+/// Returns the distance of the farthest corner from the principal point, as a distorted ray.
 double maxDistorted(const CameraModel& model) {
   const double x = std::max(std::abs(model.cx), std::abs(model.width - 1 - model.cx)) / model.fx;
   const double y = std::max(std::abs(model.cy), std::abs(model.height - 1 - model.cy)) / model.fy;
@@ -141,11 +141,11 @@ LensInverse::LensInverse(const CameraModel& model)
   if (model_.distortion != DistortionModel::kRadtan) return;
   p1_ = model_.coefficients[2];
   p2_ = model_.coefficients[3];
-  // The tangential part moves a ray by 3 |p| rho^2 at most, and the end of the branch with it.
+  // The tangential part moves a ray, and the end of the branch with it, by at most 3 |p| rho^2.
   const double max_rho = (p1_ != 0 || p2_ != 0 ? 1.2 : 1.0) * radial_.maxRho();
   max_r_ = radial_.maxR() + 3 * std::hypot(p1_, p2_) * max_rho * max_rho;
-  // The Jacobian's eigenvalues are those of the radial part, r / rho and dr / drho, changed by the
-  // norm of the tangential part at most: 7 |p| rho.
+  // The eigenvalues of the radial Jacobian are r / rho and dr / drho. The tangential part changes
+  // them by at most its norm, 7 |p| rho.
   constexpr int kSteps = 256;
   const double step = radial_.maxRho() < kMaxRay
                           ? radial_.maxRho() / kSteps
@@ -191,13 +191,13 @@ Eigen::Vector2d LensInverse::invertRadtan(const Eigen::Vector2d& distorted,
     const Eigen::Vector2d ray = newton(distorted, near);
     if (!std::isnan(ray.x())) return ray;
   }
-  // The Jacobian has no inverse at the very end of the branch.
+  // The Jacobian has no inverse at the end of the branch itself.
   const double rho = std::min(inverse_.guess(r), 0.99 * radial_.maxRho());
   return newton(distorted, rho / r * distorted);
 }
 
-/// Newton's method. The Jacobian is symmetric, so the ray is the minimum of a function that is
-/// convex on the branch: steps that do not come nearer are halved.
+/// Inverts the lens by Newton's method. The Jacobian is symmetric, so the ray is the minimum of a
+/// function that is convex on the branch: a step that does not come nearer is halved.
 Eigen::Vector2d LensInverse::newton(const Eigen::Vector2d& distorted, Eigen::Vector2d ray) const {
   constexpr int kMaxSteps = 50;
   constexpr int kMaxHalvings = 10;

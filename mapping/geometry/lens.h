@@ -13,25 +13,25 @@
 
 namespace efm {
 
-/// The radial part of a lens: r = rho (1 + k1 rho^2 + k2 rho^4 + k3 rho^6 + k4 rho^8), and its
-/// inverse on the branch that begins at the centre. Where the polynomial falls, the model folds the
-/// image over: no larger rho is on the branch.
+/// The radial part of a lens: r = rho (1 + k1 rho^2 + k2 rho^4 + k3 rho^6 + k4 rho^8). It is
+/// inverted on the branch that begins at the centre. The branch ends where the polynomial begins to
+/// fall, because the model folds the image over there.
 class RadialDistortion {
  public:
   /// @param coefficients k1, k2 ...
-  /// @param max_rho the branch ends here if the polynomial rises so far.
+  /// @param max_rho largest rho of the branch, unless the polynomial falls before.
   RadialDistortion(const std::array<double, 4>& coefficients, double max_rho);
 
-  /// r / rho, from s = rho^2.
+  /// Returns r / rho from s = rho^2.
   double ratioAt(double s) const { return 1 + s * (k_[0] + s * (k_[1] + s * (k_[2] + s * k_[3]))); }
-  /// The derivative of the ratio by s.
+  /// Returns the derivative of r / rho by s.
   double ratioSlopeAt(double s) const {
     return k_[0] + s * (2 * k_[1] + s * (3 * k_[2] + s * 4 * k_[3]));
   }
-  /// dr / drho, from s.
+  /// Returns dr / drho from s.
   double slopeAt(double s) const { return ratioAt(s) + 2 * s * ratioSlopeAt(s); }
   double rAt(double rho) const { return rho * ratioAt(rho * rho); }
-  /// The end of the branch.
+  /// Returns rho at the end of the branch.
   double maxRho() const { return max_rho_; }
   double maxR() const { return rAt(max_rho_); }
 
@@ -40,15 +40,15 @@ class RadialDistortion {
   double max_rho_;
 };
 
-/// The inverse of a radial distortion: a table for a first guess, Newton's method for the rest.
+/// The inverse of a radial distortion: a table for the first guess, then Newton's method.
 class RadialInverse {
  public:
-  /// @param max_r most r that are asked for are below it.
+  /// @param max_r end of the table. A larger r is inverted too, but more slowly.
   RadialInverse(const RadialDistortion& distortion, double max_r);
 
-  /// A rho with almost this r; of larger r than `max_r` that of the nearest one on the branch.
+  /// Returns a rho with almost this r. If r is beyond `max_r` or the branch: the rho at that end.
   double guess(double r) const;
-  /// The rho of this r; not a number where the branch does not reach it.
+  /// Returns the rho of this r; NaN if the branch ends before this r.
   double at(double r) const;
 
  private:
@@ -57,23 +57,23 @@ class RadialInverse {
   RadialDistortion distortion_;
   double max_r_;
   double nodes_per_r_;
-  std::vector<double> rho_;  // at nodes that are evenly spaced in r
+  std::vector<double> rho_;  // at nodes evenly spaced in r
 };
 
 /// The inverse of a lens: from raw pixels to viewing rays.
 ///
-/// A distortion model need not have an inverse everywhere: it may fold the image over. A pixel has
-/// a ray if the model projects this ray to the pixel, on the branch that begins at the centre: on
-/// the way from the optical axis to the ray the model's Jacobian is positive definite. On this
-/// branch Newton's method finds the ray, or there is none. From 89.994 degrees to the optical axis
-/// on, where a ray is longer than 1e4, a pixel has no ray either.
+/// A distortion model may have no inverse in a part of the image, because it may fold the image
+/// over. A pixel has a ray if the model projects the ray to the pixel and the ray is on the branch
+/// that begins at the centre: the model's Jacobian is positive definite all the way from the
+/// optical axis to the ray. Newton's method finds the ray if it exists. Rays at more than 89.994
+/// degrees to the optical axis, which are longer than 1e4, are not used: their pixels have no ray.
 class LensInverse {
  public:
   explicit LensInverse(const CameraModel& model);
 
-  /// (X/Z, Y/Z) of the ray through a raw pixel, frame `cam`. The model projects it back to the
-  /// pixel within 1e-6 pixels. Both are NaN if the pixel has no ray.
-  /// @param near a ray near it, where one is known: saves half of the time.
+  /// Returns (X/Z, Y/Z) of the ray through a raw pixel, frame `cam`. The model projects it back to
+  /// the pixel within 1e-6 pixels. Both are NaN if the pixel has no ray.
+  /// @param near a ray close to the result, if one is known: saves half of the time.
   Eigen::Vector2d rayThrough(double x, double y, const Eigen::Vector2d& near = noRay()) const;
   static Eigen::Vector2d noRay() {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
@@ -95,43 +95,43 @@ class LensInverse {
   double p1_ = 0, p2_ = 0;
   RadialDistortion radial_;
   RadialInverse inverse_;
-  double max_r_ = 0;             // no distorted ray on the branch is longer
-  double surely_on_branch_ = 0;  // rays up to this length are, whatever their direction
+  double max_r_ = 0;             // upper bound of the length of distorted rays on the branch
+  double surely_on_branch_ = 0;  // rays up to this length are on it, in any direction
 };
 
 /// The viewing ray of every pixel of one camera: computed once, then looked up per event.
 ///
-/// Stored as floats: a look-up is a random access to memory, and the smaller table fits the caches
-/// better. The relative rounding error of a ray is at most 2^-25: 2e-5 pixels at the corner of an
-/// HD image.
+/// Rays are stored as floats: a look-up is a random access to memory, and the smaller table fits
+/// the caches better. The relative rounding error of a ray is at most 2^-25: 2e-5 pixels at the
+/// corner of an HD image.
 class UndistortionTable {
  public:
-  /// Cost: one inversion of the lens per pixel, some 50 ns of processor time, rows in parallel on
-  /// the threads of the caller's task arena; memory: 8 bytes per pixel.
+  /// Inverts the lens once per pixel. Cost: some 50 ns of processor time per pixel, rows in
+  /// parallel on the threads of the caller's task arena. Memory: 8 bytes per pixel.
   explicit UndistortionTable(const CameraModel& model);
 
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// (X/Z, Y/Z) of the ray through the centre of raw pixel (x, y), frame `cam`; not a number (both)
-  /// where the pixel lies outside the lens (`LensInverse`).
+  /// Returns (X/Z, Y/Z) of the ray through the centre of raw pixel (x, y), frame `cam`. Both are
+  /// NaN if the pixel lies outside the lens (`LensInverse`).
   Eigen::Vector2d ray(int x, int y) const {
     const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
     return rays_[row + static_cast<std::size_t>(x)].cast<double>();
   }
   bool hasRay(int x, int y) const { return !std::isnan(ray(x, y).x()); }
-  /// The ray of (x, y), or else of the first pixel that has one on the way from there to the
-  /// optical axis.
+  /// Returns the ray of pixel (x, y). If it has none: the ray of the first pixel that has one on
+  /// the line from (x, y) to the optical axis.
   Eigen::Vector2d rayNear(int x, int y) const;
-  /// Per pixel, row-major: whether it lies outside the lens. Empty where none does.
+  /// Returns for each pixel, row-major, whether it lies outside the lens. Empty if no pixel does.
   std::vector<bool> outsideLens() const;
-  /// The rays of all pixels, row-major: pixel (x, y) has element y * width() + x.
+  /// Returns the rays of all pixels, row-major: pixel (x, y) has element y * width() + x.
   const Eigen::Vector2f* rays() const { return rays_.data(); }
 
  private:
   int width_ = 0;
   int height_ = 0;
-  int center_x_ = 0;  // has a ray
+  int center_x_ = 0;  // this pixel has a ray
   int center_y_ = 0;
   std::vector<Eigen::Vector2f> rays_;  // row-major
 };

@@ -18,7 +18,7 @@ constexpr NamedChoice<PlaneSpacing> kSpacings[] = {
     {PlaneSpacing::kLinear, "linear"},
 };
 
-/// Depth to the quantity that is uniform over the planes, and back: the map is its own inverse.
+/// Converts depth to the quantity that is uniform over the planes. The same function converts back.
 double uniformOf(PlaneSpacing spacing, double depth_m) {
   return spacing == PlaneSpacing::kInverse ? 1.0 / depth_m : depth_m;
 }
@@ -29,7 +29,7 @@ std::string_view nameOf(PlaneSpacing spacing) { return nameIn(kSpacings, spacing
 PlaneSpacing planeSpacingFromName(std::string_view name) { return valueIn(kSpacings, name); }
 
 void DepthPlanesOptions::validate() const {
-  // No camera sees depths outside; beyond, planes and votes lose their digits.
+  // No camera sees larger depths, and planes and votes would lose digits.
   constexpr double kMaxDepthM = 1e6;
   requireFields(*this);
   requireOption(max_depth_m > min_depth_m, "max_depth_m", max_depth_m,
@@ -68,7 +68,7 @@ namespace {
 
 constexpr int kMaxSide = 65535;
 
-/// More pixels are a mistake that would exhaust the memory.
+/// Rejects sizes that are a mistake and would exhaust the memory.
 void requirePixels(std::int64_t width, std::int64_t height) {
   constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
   requireOption(width * height <= kMaxPixels, "width", width,
@@ -76,7 +76,7 @@ void requirePixels(std::int64_t width, std::int64_t height) {
                 {"height"});
 }
 
-/// One side of the image, given the other, with the camera's aspect ratio.
+/// Returns one side of the image from the other side and the camera's aspect ratio.
 int sideInProportion(int other, int own_of_camera, int other_of_camera) {
   const double side = static_cast<double>(other) * own_of_camera / other_of_camera;
   return std::clamp(static_cast<int>(std::lround(side)), 1, kMaxSide);

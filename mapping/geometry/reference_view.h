@@ -21,7 +21,7 @@ enum class PlaneSpacing {
 std::string_view nameOf(PlaneSpacing spacing);
 PlaneSpacing planeSpacingFromName(std::string_view name);
 
-/// The nearest plane is at least this far, metres.
+/// Smallest depth of a plane, metres.
 inline constexpr double kMinDepthM = 1e-3;
 
 struct DepthPlanesOptions {
@@ -32,7 +32,7 @@ struct DepthPlanesOptions {
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
-    // Depths that are not finite or not positive come first: `validate` has narrower limits.
+    // Rejects non-finite and non-positive depths first: `validate` has narrower limits.
     visit("min_depth_m", self.min_depth_m,
           Allowed::above(0, Allowed::kFinite, "finite and above 0"));
     visit("max_depth_m", self.max_depth_m,
@@ -43,21 +43,21 @@ struct DepthPlanesOptions {
   void validate() const;
 };
 
-/// The planes of the DSI, parallel to the image of the reference view. Plane 0 is the nearest; the
-/// first and the last plane are exactly the two limits.
+/// The planes of the DSI, parallel to the image of the reference view. Plane 0 is the nearest. The
+/// depths of the first and the last plane are exactly the two limits.
 class DepthPlanes {
  public:
   explicit DepthPlanes(const DepthPlanesOptions& options = {});
 
   int size() const { return static_cast<int>(depths_.size()); }
-  /// Depth of a plane in metres.
+  /// Returns the depth of a plane in metres.
   double depth(int plane) const { return depths_[static_cast<std::size_t>(plane)]; }
-  /// Depth at a position between planes: 0 is the nearest plane, size() - 1 the farthest.
+  /// Returns the depth in metres at a position from 0 (nearest plane) to size() - 1 (farthest).
   double depthAt(double position) const;
-  /// Distance of the two nearest planes in inverse depth, 1/m. Inverse spacing has the same
-  /// distance everywhere. 0 with one plane.
+  /// Returns the difference of the two nearest planes in inverse depth, 1/m; 0 if there is one
+  /// plane. With inverse spacing all neighbouring planes have this difference.
   double inverseDepthStep() const;
-  /// Distance of neighbouring planes around a position, 1/m. @param position 0 to size() - 1.
+  /// Returns the inverse depth step around a position (0 to size() - 1), 1/m.
   double inverseDepthStepAt(double position) const;
 
  private:
@@ -72,7 +72,7 @@ struct ReferenceView {
   int height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< Pixels.
 
-  /// A camera's view without distortion: the same size and intrinsics.
+  /// Returns a camera's view without distortion: the same size and intrinsics.
   static ReferenceView of(const CameraModel& model) {
     return {model.width, model.height, model.fx, model.fy, model.cx, model.cy};
   }
@@ -84,7 +84,7 @@ struct ReferenceView {
   Eigen::Vector2d project(const Eigen::Vector3d& p_ref) const {
     return {fx * p_ref.x() / p_ref.z() + cx, fy * p_ref.y() / p_ref.z() + cy};
   }
-  /// The point at z-depth `depth_m` (metres) on the ray of pixel (x, y), frame `ref`.
+  /// Returns the point at z-depth `depth_m` (metres) on the ray of pixel (x, y), frame `ref`.
   Eigen::Vector3d pointAt(double x, double y, double depth_m) const {
     return {(x - cx) / fx * depth_m, (y - cy) / fy * depth_m, depth_m};
   }
@@ -92,10 +92,10 @@ struct ReferenceView {
 
 struct ReferenceViewOptions {
   /// Horizontal field of view in degrees, above 0 and below 180. Pixels keep the camera's aspect
-  /// ratio, the principal point is the image's centre. Not given: the camera's own intrinsics.
+  /// ratio, and the principal point is the image's centre. Not given: the camera's own intrinsics.
   std::optional<double> fov_deg;
-  /// Size in pixels, 1 to 65,535 each, at most 2^26 pixels in all. Not given: the camera's. If only
-  /// one is given, the other follows by the camera's aspect ratio.
+  /// Size in pixels, 1 to 65,535 each, at most 2^26 pixels in all. Not given: the camera's size. If
+  /// only one side is given, the camera's aspect ratio determines the other side.
   std::optional<int> width;
   std::optional<int> height;
   /// Shift along the view's own axes (x right, y down, z forward), metres.
@@ -111,8 +111,8 @@ struct ReferenceViewOptions {
   void validate() const;
 };
 
-/// A camera's view without distortion, with the field of view and size of the options. A size
-/// without a field of view keeps the camera's: the same image at another resolution.
+/// Returns a camera's view without distortion, with the field of view and size of the options. If a
+/// size is given but no field of view, the view shows the camera's image at another resolution.
 ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOptions& options);
 
 /// Rays from one camera centre that all run forward or all run backward along the reference view's
@@ -121,21 +121,21 @@ struct RayPacket {
   std::size_t begin = 0;                                 ///< Index of the first ray.
   std::size_t end = 0;                                   ///< One past the index of the last ray.
   Eigen::Vector3d center_ref = Eigen::Vector3d::Zero();  ///< Camera centre C, frame `ref`, metres.
-  bool forward = true;                                   ///< The rays run towards larger z.
+  bool forward = true;                                   ///< True if the rays run towards larger z.
 };
 
-/// Where a packet's rays meet one plane: x = scale * x_inf + offset_x, likewise y. (x_inf, y_inf)
-/// is the pixel where a ray meets the plane at infinity.
+/// The pixels where a packet's rays meet one plane: x = scale * x_inf + offset_x, likewise y.
+/// (x_inf, y_inf) is the pixel where a ray meets the plane at infinity.
 struct PlaneTransfer {
   double scale = 0;
   double offset_x = 0;
   double offset_y = 0;
-  bool in_front = false;  ///< The plane lies before the event camera, along its rays.
+  bool in_front = false;  ///< True if the plane lies ahead of the event camera along its rays.
 };
 
-/// The transfer of a packet's rays to the plane at depth `depth_m`: the second step of Rebecq et
-/// al. (IJCV 2018, Eq. 15) with the plane at infinity as Z0, x(Z) = (1 - C_z/Z) x_inf + (f C_x + c
-/// C_z) / Z.
+/// Returns the transfer of a packet's rays to the plane at depth `depth_m`: the second step of
+/// Rebecq et al. (IJCV 2018, Eq. 15) with the plane at infinity as Z0. x(Z) = (1 - C_z/Z) x_inf +
+/// (f C_x + c C_z) / Z, where C is the camera centre, and f and c are the view's fx and cx.
 PlaneTransfer transferToPlane(const RayPacket& packet, const ReferenceView& view, double depth_m);
 
 }  // namespace efm

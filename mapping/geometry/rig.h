@@ -18,7 +18,7 @@ enum class DistortionModel {
   kEquidistant,  ///< Kannala-Brandt fisheye: k1 k2 k3 k4.
 };
 
-/// "none", "radtan" or "equidistant": Kalibr's names.
+/// Returns "none", "radtan" or "equidistant", as Kalibr names the models.
 std::string_view nameOf(DistortionModel model);
 DistortionModel distortionModelFromName(std::string_view name);
 
@@ -34,25 +34,25 @@ struct CameraModel {
 
   void validate() const;
 
-  /// Raw (distorted) pixel of a point of frame `cam` with z > 0.
+  /// Returns the raw (distorted) pixel of a point of frame `cam` with z > 0.
   Eigen::Vector2d project(const Eigen::Vector3d& p_cam) const;
 
   friend bool operator==(const CameraModel& a, const CameraModel& b);
   friend bool operator!=(const CameraModel& a, const CameraModel& b) { return !(a == b); }
 };
 
-/// One camera of the rig. In imported recordings the rig's frame is that of camera 0.
+/// One camera of the rig. In imported recordings, frame `rig` is the frame of camera 0.
 struct RigCamera {
   CameraModel model;
   Rigid3 T_rig_cam;                 ///< Extrinsic calibration.
-  std::int64_t time_offset_ns = 0;  ///< Added to the camera's stamps: t = t_event + offset.
+  std::int64_t time_offset_ns = 0;  ///< Added to the event's time: t = t_event + offset.
 
   /// @throws std::invalid_argument naming the value and what was expected: a valid model, finite
-  /// extrinsics with a unit quaternion, an offset that no event's time overflows with.
+  /// extrinsics with a unit quaternion, and an offset with which no event's time overflows.
   void validate() const;
 };
 
-/// Whether both have the same lens, pose on the rig and clock, to the last bit.
+/// Returns whether both have the same lens, pose on the rig and time offset, to the last bit.
 inline bool isSame(const RigCamera& a, const RigCamera& b) {
   return a.model == b.model && isSame(a.T_rig_cam, b.T_rig_cam) &&
          a.time_offset_ns == b.time_offset_ns;
@@ -63,10 +63,10 @@ struct Rig {
   std::vector<RigCamera> cameras;
 };
 
-/// Returns whether a camera is among the selected indices. An empty list selects all cameras.
+/// Returns whether a camera is in the selection. An empty selection has all cameras.
 bool isSelected(int camera, const std::vector<int>& selection);
-/// The indices of the cameras that are chosen, in the order of the selection; empty: all of the
-/// rig.
+/// Returns the indices of the selected cameras in the order of the selection. An empty selection
+/// has all cameras of the rig.
 std::vector<int> selectedCameras(const Rig& rig, const std::vector<int>& selection);
 
 }  // namespace efm

@@ -10,13 +10,13 @@ namespace efm {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
-/// Angles are radians everywhere but in files and option keys (`_deg`).
+/// Angles are in radians everywhere, except in files and option keys (`_deg`).
 inline constexpr double kRadiansPerDegree = kPi / 180;
 
 /// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
 /// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
 ///
-/// Invariant: `rotation` has unit norm; code that fills it from outside normalises it.
+/// Invariant: `rotation` has unit norm. Code that sets it from outside must normalise it.
 struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< Metres.
@@ -33,36 +33,35 @@ struct Rigid3 {
   }
 };
 
-/// Whether two transforms are the same bit for bit.
+/// Returns whether two transforms are the same bit for bit.
 inline bool isSame(const Rigid3& T_a_b, const Rigid3& other) {
   return T_a_b.translation == other.translation &&
          T_a_b.rotation.coeffs() == other.rotation.coeffs();
 }
 
-/// The pose at `fraction` in [0, 1] between two poses: linear in position, slerp along the shorter
-/// arc in rotation.
+/// Returns the pose at `fraction` in [0, 1] between two poses: linear in position, slerp along the
+/// shorter arc in rotation.
 inline Rigid3 interpolate(const Rigid3& T_a_b0, const Rigid3& T_a_b1, double fraction) {
   return {T_a_b0.rotation.slerp(fraction, T_a_b1.rotation),
           (1.0 - fraction) * T_a_b0.translation + fraction * T_a_b1.translation};
 }
 
-/// The rotation about the direction of a vector by its length in radians: the exponential map of
-/// SO(3).
+/// Returns the rotation about a vector by its length in radians: the exponential map of SO(3).
 inline Eigen::Quaterniond rotationBy(const Eigen::Vector3d& rotation_vector) {
   const double angle = rotation_vector.norm();
   if (angle <= 0) return Eigen::Quaterniond::Identity();
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
 
-/// Rotations and transforms from the numbers of files, which are rounded.
+/// Functions for rotations and transforms from files, whose numbers are rounded.
 
-/// The rotation nearest to a matrix R. R * R^T may differ from the identity by 1e-3 in a number.
-/// @return std::nullopt for other matrices, reflections and numbers that are not finite.
+/// Returns the rotation nearest to a matrix R. Each element of R * R^T may differ from the identity
+/// by 1e-3. @return std::nullopt for other matrices, reflections and non-finite numbers.
 std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Matrix3d& R_a_b);
-/// The transform nearest to a matrix: its rotation as above. The last row may differ from 0 0 0 1
-/// by 1e-3 in a number.
+/// Returns the transform nearest to a matrix; its rotation as above. Each number of the last row
+/// may differ from 0 0 0 1 by 1e-3. @return std::nullopt for other matrices.
 std::optional<Rigid3> transformNear(const Eigen::Matrix4d& T_a_b);
-/// Returns the rotation of a quaternion, or std::nullopt unless its length is 1 within 1 %.
+/// Returns the rotation of a quaternion whose length is 1 within 1 %; std::nullopt for others.
 std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Quaterniond& rotation);
 
 }  // namespace efm

@@ -14,7 +14,7 @@ constexpr int kNanosecondDigits = 9;
 
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
-/// Appends a decimal digit. @return false where the value would leave 64 bits.
+/// Appends a decimal digit. @return false if the value would not fit 64 bits.
 bool appendDigit(std::int64_t& value, int digit) {
   constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
   if (value > (kMax - digit) / 10) return false;
@@ -46,7 +46,7 @@ std::string_view takeDigits(std::string_view& text) {
   return digits;
 }
 
-/// Splits unsigned decimal text. Returns std::nullopt unless all of it is a number.
+/// Splits unsigned decimal text. @return std::nullopt if the whole text is not a number.
 std::optional<DecimalDigits> splitDecimal(std::string_view text) {
   DecimalDigits digits;
   digits.integer = takeDigits(text);
@@ -59,7 +59,7 @@ std::optional<DecimalDigits> splitDecimal(std::string_view text) {
     text.remove_prefix(1);
     if (!text.empty() && text.front() == '+') {
       text.remove_prefix(1);
-      if (!text.empty() && text.front() == '-') return std::nullopt;  // parseNumber takes a minus
+      if (!text.empty() && text.front() == '-') return std::nullopt;  // parseNumber accepts a minus
     }
     const std::optional<int> exponent = parseNumber<int>(text);
     if (!exponent || *exponent < -1000 || *exponent > 1000) return std::nullopt;
@@ -88,7 +88,7 @@ std::optional<std::int64_t> parseTimeIn(std::string_view text, int exponent) {
       static_cast<std::int64_t>(digits->integer.size()) + digits->exponent + kNanosecondDigits;
   std::int64_t t_ns = 0;
   for (std::int64_t i = 0; i < whole; ++i) {
-    if (t_ns == 0 && i >= digits->count()) break;  // zero, whatever its exponent
+    if (t_ns == 0 && i >= digits->count()) break;  // zero, with any exponent
     if (!appendDigit(t_ns, digits->digitAt(i))) return std::nullopt;
   }
   if (whole >= 0 && whole < digits->count() && digits->digitAt(whole) >= 5) {

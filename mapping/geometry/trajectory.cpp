@@ -59,7 +59,7 @@ void Trajectory::forgetBefore(std::int64_t t_ns) {
   // The last pose at or before t_ns is one end of the segment that contains it.
   const auto after = std::upper_bound(poses_.begin(), poses_.end(), t_ns, later);
   const auto unneeded = (after - poses_.begin()) - 1;
-  // Erasing moves fewer poses than it removes: constant cost on average.
+  // This erase moves fewer poses than it removes: constant cost on average.
   if (unneeded > static_cast<std::ptrdiff_t>(poses_.size() / 2)) {
     poses_.erase(poses_.begin(), poses_.begin() + unneeded);
   }
@@ -67,7 +67,7 @@ void Trajectory::forgetBefore(std::int64_t t_ns) {
 
 Trajectory Trajectory::moved(std::int64_t from_ns, std::int64_t to_ns,
                              const std::function<Rigid3(const StampedPose&)>& T_world_moved) const {
-  // Each time needs the pose before it and the pose after it.
+  // A time needs the pose before it and the pose after it.
   auto begin = std::upper_bound(poses_.begin(), poses_.end(), from_ns, later);
   if (begin != poses_.begin()) --begin;
   auto end = std::lower_bound(begin, poses_.end(), to_ns, earlier);
@@ -96,7 +96,7 @@ std::optional<TrajectorySegment> Trajectory::segmentAt(std::int64_t t_ns,
   if (poses_.empty() || t_ns < poses_.front().t_ns || t_ns > poses_.back().t_ns) {
     return std::nullopt;
   }
-  // The cursor is the pose at or before t_ns: try this one and the next, then search.
+  // The cursor is the index of the pose at or before t_ns: try it and the next index, then search.
   const auto holds = [&](std::size_t i) {
     return i < poses_.size() && poses_[i].t_ns <= t_ns &&
            (i + 1 == poses_.size() || t_ns < poses_[i + 1].t_ns);

@@ -25,16 +25,15 @@ struct StampedPose {
   Rigid3 T_world_rig;
 };
 
-/// The noise of one pose as a tracker states it: standard deviations on each axis, metres and
-/// radians.
+/// Noise of one pose as the tracker states it: standard deviation on each axis, metres and radians.
 struct PoseNoise {
   double noise_m = 0;
   double noise_rad = 0;
 };
 
 struct TrajectoryOptions {
-  /// Between two neighbouring poses with a longer gap there is no pose. Above 0. Real recordings
-  /// have gaps up to 0.13 s that interpolation still bridges well.
+  /// Longest gap between neighbouring poses that is interpolated; a longer gap has no pose. Above
+  /// 0. Real recordings have gaps up to 0.13 s that interpolation still bridges well.
   double max_pose_gap_s = 0.25;
 
   template <typename Self, typename Visit>
@@ -44,42 +43,42 @@ struct TrajectoryOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// Two neighbouring poses and the closed interval between them; both are the same pose where a pose
-/// has a gap after it.
+/// Two neighbouring poses and the closed interval between them. If a gap or the end follows a pose,
+/// `first` and `last` are both that pose.
 struct TrajectorySegment {
   StampedPose first;
   StampedPose last;
 
-  /// The pose at a time inside the segment.
+  /// Returns the pose at a time inside the segment.
   Rigid3 poseAt(std::int64_t t_ns) const;
 };
 
-/// The rig's motion: poses in time order; between them, linear in position and slerp in rotation.
+/// The rig's motion: poses in time order, between them linear in position and slerp in rotation.
 /// Never extrapolates. Not thread-safe while poses are added; queries are const.
 class Trajectory {
  public:
   explicit Trajectory(const TrajectoryOptions& options = {});
 
-  /// Adds a pose at any time; cost is constant for the newest. Of two poses at the same time the
-  /// first one stays. @return false for such a duplicate.
-  /// @throws std::invalid_argument where the pose is not finite, its quaternion has no length, or
-  /// its time lies beyond kEndOfTimeNs.
+  /// Adds a pose at any time; cost is constant for the newest pose. @return false, without a
+  /// change, if there is a pose of the same time already.
+  /// @throws std::invalid_argument if the pose is not finite, its quaternion has length 0, or its
+  /// time lies beyond kEndOfTimeNs.
   bool add(const StampedPose& pose);
 
-  /// May remove poses that times from `t_ns` on do not need; cost is constant on average.
+  /// Removes some of the poses that times from `t_ns` on do not need; cost is constant on average.
   void forgetBefore(std::int64_t t_ns);
 
-  /// Returns T_world_rig, or std::nullopt outside the recorded times and inside a gap. At a
-  /// recorded time always the recorded pose.
+  /// Returns T_world_rig; std::nullopt outside the recorded times or in a gap. At a recorded time
+  /// it is always the recorded pose.
   std::optional<Rigid3> poseAt(std::int64_t t_ns) const;
 
-  /// The segment that contains `t_ns`; at a recorded time the one that begins there, if there is
-  /// one.
+  /// Returns the segment that contains `t_ns`. At a recorded time it is the segment that begins
+  /// there, if there is one. @return std::nullopt outside the recorded times or in a gap.
   /// @param cursor any number at first; then its value after the previous call, so that nearby
   /// queries need no search.
   std::optional<TrajectorySegment> segmentAt(std::int64_t t_ns, std::size_t& cursor) const;
 
-  /// The poses that [from, to] needs, each replaced by its `T_world_moved`; gaps stay gaps.
+  /// Returns the poses that [from, to] needs, each replaced by its `T_world_moved`. Gaps stay gaps.
   Trajectory moved(std::int64_t from_ns, std::int64_t to_ns,
                    const std::function<Rigid3(const StampedPose&)>& T_world_moved) const;
 
@@ -93,53 +92,53 @@ class Trajectory {
   std::vector<StampedPose> poses_;  // strictly increasing times
 };
 
-/// The motion of one camera in the reference view during one segment of the trajectory. Terms that
-/// do not depend on time are computed once, because a segment is asked for thousands of poses.
+/// The motion of one camera in the reference view during one segment of the trajectory. Thousands
+/// of poses are computed per segment, so terms that do not depend on time are computed once.
 ///
 /// Slerp commutes with fixed rotations on both sides, so it runs between the camera's own
-/// rotations. The camera's position is that of the rig, which moves on a line, plus the rotated
+/// rotations. The camera's position is the rig's position, which moves on a line, plus the rotated
 /// lever arm.
 class CameraMotion {
  public:
   CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref_world,
                const Rigid3& T_rig_cam);
 
-  /// T_ref_cam = T_ref_world * segment.poseAt(t_ns) * T_rig_cam up to rounding. `t_ns` lies inside
-  /// the segment.
+  /// Returns T_ref_cam = T_ref_world * segment.poseAt(t_ns) * T_rig_cam, up to rounding. `t_ns`
+  /// lies inside the segment.
   Rigid3 poseAt(std::int64_t t_ns) const;
 
  private:
   std::int64_t first_ns_;
   double per_ns_ = 0;  // 1 / length of the segment; 0 for the segment of a single pose
   Eigen::Quaterniond R_ref_cam0_;
-  Eigen::Quaterniond R_ref_cam1_;  // its sign is the one nearer to R_ref_cam0_
+  Eigen::Quaterniond R_ref_cam1_;  // with the sign that is nearer to R_ref_cam0_
   double angle_ = 0;               // between the two unit quaternions: half the rotation angle
-  double sine_ = 0;                // of `angle_`; 0 where it is too small to divide by
+  double sine_ = 0;                // of `angle_`; 0 if too small to divide by
   Eigen::Vector3d rig0_ref_;       // position of the rig at the first pose
-  Eigen::Vector3d step_ref_;       // from there to the rig's position at the last pose
+  Eigen::Vector3d step_ref_;       // from rig0_ref_ to the position at the last pose
   Eigen::Vector3d lever_cam_;      // from the rig to the camera
 };
 
-/// Trajectories in the text format of the TUM RGB-D benchmark: a line `t tx ty tz qx qy qz qw` for
+/// The text format of the TUM RGB-D benchmark for trajectories: a line `t tx ty tz qx qy qz qw` for
 /// each pose, in metres and decimal seconds. Blank lines and comments after `#` are skipped.
 
 /// Reads the poses T_world_rig in the order of the file. Times are exact. Quaternions are
-/// normalised, because files have few digits. A length that differs from 1 by more than 1 % is an
+/// normalised, because files have few digits; a length that differs from 1 by more than 1 % is an
 /// error.
 std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file);
-/// @param name of the stream, for errors.
+/// @param name name of the stream, for errors.
 std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name);
 
-/// The same for the poses of a recording: at least one.
+/// Reads the poses of a recording from such a file. A file without a pose is an error.
 std::vector<StampedPose> readPosesFile(const std::filesystem::path& file);
 
-/// The pose of a line.
+/// Parses the pose of a line.
 /// @param fields t tx ty tz qx qy qz qw.
-/// @param time_exponent of the unit of t: 10^time_exponent seconds, -9 to 0.
+/// @param time_exponent unit of t as a power of ten, in seconds: -9 to 0.
 StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent = 0);
 
-/// Writes times with nine decimals and other numbers with 17 significant digits: the file is read
-/// back exactly, up to the rounding of the normalisation.
+/// Writes times with nine decimals and other numbers with 17 significant digits. Reading the file
+/// gives the same poses, up to the rounding of the normalisation.
 void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses);
 void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses);
 /// Writes the line of a pose.
