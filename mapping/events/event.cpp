@@ -27,7 +27,7 @@ void requireInsideSensor(EventSpan events, int camera, const CameraModel& model)
 
 namespace {
 
-/// Pseudo-random bits of a number: the finaliser of SplitMix64 (Steele et al., OOPSLA 2014).
+/// Returns pseudo-random bits: the finaliser of SplitMix64 (Steele et al., OOPSLA 2014).
 std::uint64_t randomBits(std::uint64_t number) {
   std::uint64_t bits = (number + 1) * 0x9e3779b97f4a7c15U;
   bits = (bits ^ (bits >> 30U)) * 0xbf58476d1ce4e5b9U;
@@ -81,14 +81,14 @@ std::uint64_t EventBuffer::insert(EventSpan added) {
     }
     newest = std::max(newest, event.t_ns);
   }
-  // Times are whole: the first event later than the earliest late one. The old events are sorted.
+  // Old events are sorted. + 1 (ns) finds the first event later than the earliest late event.
   const std::size_t first_unsorted = late > 0 ? indexOf(earliest_late + 1) : 0;
   const std::size_t before = events.size();
   try {
     events.insert(events.end(), added.begin(), added.end());
     used.resize(events.size());
     if (late > 0) sortFrom(first_unsorted);
-  } catch (...) {  // no memory
+  } catch (...) {  // out of memory
     events.resize(before);
     used.resize(before);
     throw;

@@ -26,29 +26,29 @@ struct CountsBy {
   friend bool operator==(const CountsBy& a, const CountsBy& b) { return a.counts == b.counts; }
 };
 
-/// What became of an event. Each event has one fate, at the latest when the mapping ends.
+/// The fate of an event. Each event has one fate, at the latest when the mapping ends.
 enum class EventFate {
   // Fates in the mapping.
-  kUsed,           ///< Voted in at least one keyframe.
+  kUsed,           ///< The event voted in at least one keyframe.
   kWithoutPose,    ///< The trajectory has no pose at its time.
-  kOutsideWindow,  ///< Lies in no window that was mapped.
-  kDropped,        ///< Came too late, in a window that was dropped, or of an unselected camera.
-  kFiltered,       ///< Removed as noise, with a pose or without.
+  kOutsideWindow,  ///< The event is in no window that was mapped.
+  kDropped,        ///< Too late, in a dropped window, or from an unselected camera.
+  kFiltered,       ///< Removed as noise, with or without a pose.
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
-  kOverBudget,     ///< Lies in a window that was mapped, but was not chosen there.
+  kOverBudget,     ///< In a mapped window, but not among the events chosen for it.
   // Fates in the queue of live operation, before the mapping.
-  kSubsampled,  ///< Left out by the budget in sensor time.
+  kSubsampled,  ///< Subsampled: over the limit of events per second of sensor time.
   kQueueFull,   ///< Dropped because the queue was full.
-  kRejected,    ///< Its packet contradicts its camera, or it is over a second ahead of its stream.
-  kPaused,      ///< Came while map updating was disabled.
-  kAfterEnd,    ///< Came after the end of the input.
+  kRejected,    ///< In a packet that contradicts its camera, or over 1 s ahead of its stream.
+  kPaused,      ///< Arrived while map updating was disabled.
+  kAfterEnd,    ///< Arrived after the end of the input.
 };
 
 struct EventFateRow {
   EventFate fate;
-  const char* key;      ///< The key in report.json.
-  const char* text;     ///< What follows "5.1 %" in a summary.
-  bool is_loss = true;  ///< Lost in live operation; the others are what the options ask for.
+  const char* key;      ///< Key in report.json.
+  const char* text;     ///< Text after "5.1 %" in a summary.
+  bool is_loss = true;  ///< True if lost in live operation; false if the options ask for it.
 };
 
 inline constexpr EventFateRow kEventFates[] = {
@@ -71,9 +71,9 @@ constexpr const EventFateRow& rowOf(EventFate fate) {
 }
 constexpr bool isOfQueue(EventFate fate) { return fate >= EventFate::kSubsampled; }
 
-/// The number of events by their fates.
+/// Number of events with each fate.
 struct EventFates : CountsBy<EventFate, std::size(kEventFates)> {
-  /// Events that are lost in live operation.
+  /// Returns the number of events that are lost in live operation.
   std::uint64_t losses() const {
     std::uint64_t sum = 0;
     for (const EventFateRow& row : kEventFates) sum += row.is_loss ? (*this)[row.fate] : 0;
@@ -81,7 +81,7 @@ struct EventFates : CountsBy<EventFate, std::size(kEventFates)> {
   }
 };
 
-/// One camera's events in the mapping: `read` is the sum of the fates of the mapping.
+/// Counts of one camera's events in the mapping. `read` is the sum of the fates of the mapping.
 struct EventCounts {
   std::uint64_t read = 0;
   EventFates fates;

@@ -53,7 +53,7 @@ void HotPixelFilter::startPeriod(std::size_t row) {
                  [&](std::uint32_t counts) { return counted_before ? counts >> kHalf : 0; });
 }
 
-/// Whether a pixel with enough events fires too often beside its neighbours.
+/// Returns whether a pixel with enough events fires too often compared with its neighbours.
 bool HotPixelFilter::isBusiest(const Event& event) {
   if (width_ == 1 || height_ == 1) return false;
   bringUpToDate(event.y);
@@ -91,8 +91,8 @@ std::uint64_t FilteredEvents::release(std::int64_t until_ns, EventBuffer& buffer
                                    [&](const Event& event) { return !filter_.keeps(event); });
   const auto kept = static_cast<std::size_t>(last - at(waiting_.begin));
   if (buffer.begin == buffer.events.size() && kept > buffer.events.capacity()) {
-    // After a wait the memory changes hands: a copy would hold all events twice.
-    EventBuffer rest;  // complete before the exchange: memory may fail
+    // After a long wait the memory is exchanged, because a copy would hold all events twice.
+    EventBuffer rest;  // filled before the exchange, because memory may run out
     rest.insert({waiting_.events.data() + end, waiting_.events.data() + waiting_.events.size()});
     waiting_.cut(waiting_.begin + kept);
     buffer = std::exchange(waiting_, std::move(rest));

@@ -31,7 +31,7 @@ constexpr NamedChoice<SubintervalShuffle> kShuffles[] = {
     {SubintervalShuffle::kRandom, "random"},
 };
 
-/// Fisher and Yates. std::shuffle may draw differently with another standard library.
+/// Shuffles as Fisher and Yates. std::shuffle may draw differently with another standard library.
 void shuffleWith(std::mt19937& random, std::vector<int>& items) {
   for (std::size_t left = items.size(); left > 1; --left) {
     std::swap(items[left - 1], items[random() % left]);
@@ -58,7 +58,7 @@ std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_n
                                              std::int64_t t1_ns,
                                              const SubintervalOptions& options) {
   const auto count = static_cast<std::size_t>(options.count);
-  // A whole quotient and a rest, so that no product overflows.
+  // An integer quotient and a remainder, so that no product overflows.
   const std::int64_t quotient_ns = (t1_ns - t0_ns) / options.count;
   const std::int64_t rest_ns = (t1_ns - t0_ns) % options.count;
   std::vector<EventSpan> parts;
@@ -104,7 +104,7 @@ EventSpan EventPart::select(PolaritySplit& split) const {
     for (const std::size_t on : {0, 1}) {
       if (split.of[on].size() < sizes[on]) split.of[on].resize(sizes[on]);
     }
-    // There is no branch here: random polarities would make it unpredictable.
+    // This loop has no branch, because random polarities make a branch unpredictable.
     Event* next[2] = {split.of[0].data(), split.of[1].data()};
     for (const Event& event : all) *next[event.polarity ? 1 : 0]++ = event;
     split.size[0] = sizes[0];
@@ -142,7 +142,7 @@ std::vector<EventPart> EventGroups::partsOf(EventSpan events, const Window& wind
 
 FusionLayout EventGroups::layoutOf(int cameras) const {
   const std::vector<std::vector<int>> slots = assignSubintervals(cameras, subintervals_);
-  const int groups = split_.time_slices * split_.polarities();  // of a camera
+  const int groups = split_.time_slices * split_.polarities();  // groups of one camera
   FusionLayout layout;
   layout.groups = cameras == 1 ? split_.polarities() : groups;
   for (std::size_t camera = 0; camera < slots.size(); ++camera) {
