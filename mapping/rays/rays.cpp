@@ -12,20 +12,20 @@ namespace {
 constexpr std::size_t kGridSide = 3;
 static_assert(kGridSide * kGridSide == GridVotes::kRays);
 
-/// If the speed changes by this fraction, parabolas err by a percent.
+/// If the speed changes by this fraction, parabolas have an error of 1 %.
 constexpr double kEvenChange = 0.1;
 
 bool isNear(const ReferenceView& view, double x, double y) {
   return x >= -view.width && x <= 2 * view.width && y >= -view.height && y <= 2 * view.height;
 }
 
-/// Squares of the largest steps of votes, in pixels per half of the interval.
+/// Squares of the largest displacements and speeds of votes, in pixels per half of the interval.
 struct MaxSteps {
-  double first = 0;   ///< Motion from the start to the middle.
-  double second = 0;  ///< Motion from the middle to the end.
-  double start = 0;   ///< The speed at the start and at the end.
-  double end = 0;
-  double change = 0;  ///< Change from the first to the second half.
+  double first = 0;   ///< Displacement from the start to the middle.
+  double second = 0;  ///< Displacement from the middle to the end.
+  double start = 0;   ///< Speed at the start.
+  double end = 0;     ///< Speed at the end.
+  double change = 0;  ///< Change of speed from the first to the second half.
   bool any = false;
 
   void add(const Eigen::Vector2d& first_half, const Eigen::Vector2d& second_half) {
@@ -114,7 +114,7 @@ class PacketSplitter {
       : events_(events), camera_(camera), grid_(grid), error_px_(error_px), packets_(packets) {}
 
   /// Splits events [begin, end) at the middle of their time until the error of each part is within
-  /// the bound. Where votes move evenly, the error of smaller parts follows from their speed.
+  /// the bound. If votes move evenly, the error of smaller parts follows from the votes' speed.
   void split(std::size_t begin, std::size_t end) const {
     const TimeSpan span = spanOf(begin, end);
     if (span.first_ns == span.last_ns) return append(begin, end, camera_.poseAt(span.first_ns));
@@ -184,8 +184,8 @@ class PacketSplitter {
   std::vector<PosePacket>& packets_;
 };
 
-/// One past the last event in the segment of event `begin`. An event at the segment's end is in the
-/// next segment; at the last pose it is in the last one.
+/// Returns the index after the last event in the segment of event `begin`. An event at the
+/// segment's end is in the next segment, but an event at the last pose is in the last segment.
 std::size_t endOfSegment(EventSpan events, std::size_t begin, const TrajectorySegment& segment) {
   const std::int64_t end_ns = std::max(segment.last.t_ns, events[begin].t_ns + 1);
   const Event* end =
@@ -226,15 +226,15 @@ namespace {
 struct ProjectedRay {
   float x = 0;  ///< Pixel on the plane at infinity.
   float y = 0;
-  float z = 0;  ///< Negative where it runs towards smaller z.
+  float z = 0;  ///< Negative if the ray runs towards smaller z.
 };
 
 /// Maps a camera's rays to pixels on the reference view's plane at infinity: the homography of
 /// Ghosh and Gallego 2022, Eq. 4, with Z at infinity. The principal point is added last, so that
-/// errors of rounding grow with the distance from it.
+/// rounding errors grow with the distance from it.
 ///
-/// Float coordinates are at most 3e-4 pixels off at HD, and any x86-64 processor computes four
-/// rays at once.
+/// The type is float: the error is at most 3e-4 pixels at HD, and any x86-64 processor computes
+/// four rays at once.
 class InfinityHomography {
  public:
   InfinityHomography(const Rigid3& T_ref_cam, const ReferenceView& view)
@@ -276,7 +276,7 @@ class BundleBuilder {
       close(packet, begin, true);
       return;
     }
-    // Rare: the camera looks sideways or back. Forward rays come first, then backward ones.
+    // Rare: the camera looks sideways or back. Forward rays come first, then backward rays.
     resize(begin);
     appendDirection(packet, project, true);
     appendDirection(packet, project, false);
@@ -295,7 +295,7 @@ class BundleBuilder {
     bundle_.y_inf.resize(rays);
   }
 
-  /// Appends the rays in frame `cam`. A separate loop, because table look-ups have no vectors.
+  /// Appends the rays in frame `cam`. This loop is separate: table look-ups cannot be vectorised.
   void lookUp(const PosePacket& packet) {
     const std::size_t first = bundle_.size();
     resize(first + packet.end - packet.begin);
@@ -306,12 +306,12 @@ class BundleBuilder {
       const Eigen::Vector2f& ray = rayOf(events_[i]);
       x[end] = ray.x();
       y[end] = ray.y();
-      end += isRay(ray) ? 1 : 0;  // the next one takes its place
+      end += isRay(ray) ? 1 : 0;  // if it is no ray, the next one overwrites it
     }
     resize(end);
   }
 
-  /// Projects the rays from `begin` on in place. The homography is a copy that stays in registers.
+  /// Projects the rays from `begin` on, in place. `project` is a copy, so it stays in registers.
   /// @return the number of backward rays.
   std::uint32_t projectFrom(std::size_t begin, const InfinityHomography project) {
     const std::size_t count = bundle_.size() - begin;

@@ -20,16 +20,16 @@
 namespace efm {
 
 /// The pixels of the reference view where the rays of a grid over the sensor, corners included,
-/// meet the nearest and the farthest plane. A pixel outside the lens stands for the next one
-/// inside.
+/// meet the nearest and the farthest plane. A grid pixel outside the lens is replaced by the next
+/// pixel inside, towards the optical axis.
 struct GridVotes {
   static constexpr std::size_t kRays = 9;
   static constexpr std::size_t kVotes = 2 * kRays;
 
   std::array<double, kVotes> x{};
   std::array<double, kVotes> y{};
-  std::array<bool, kVotes> in_front{};   ///< The plane lies before the camera, along the ray.
-  std::array<bool, kVotes> near_view{};  ///< Inside the view or at most its own size away from it.
+  std::array<bool, kVotes> in_front{};   ///< True if the plane is ahead along the ray.
+  std::array<bool, kVotes> near_view{};  ///< True if inside the view or at most its size away.
 };
 
 class VoteGrid {
@@ -45,24 +45,24 @@ class VoteGrid {
   std::array<double, 2> depths_m_;
 };
 
-/// How far votes move with the camera in an interval of time: along parabolas through their pixels
-/// at its start, middle and end. The vote that moves most counts. Votes far from the view count
-/// only where no vote is near it.
+/// The displacement of votes due to the camera's motion in an interval of time. Votes move along
+/// parabolas through their pixels at the interval's start, middle and end. The vote that moves most
+/// counts. Votes far from the view count only if no vote is near it.
 class VoteDisplacement {
  public:
-  /// @param votes at the start, in the middle and at the end.
+  /// @param votes votes at the start, in the middle and at the end.
   /// @return std::nullopt if a vote appears or disappears between the three times.
   static std::optional<VoteDisplacement> measure(std::int64_t start_ns, std::int64_t end_ns,
                                                  const std::array<const GridVotes*, 3>& votes);
 
-  /// Pixels from the middle to the start or the end, whichever is farther.
+  /// Returns the displacement from the middle to the start or to the end (the larger one), pixels.
   double fromMiddle() const { return from_middle_px_; }
-  /// Whether the speed changes so little that the parabolas hold at all times: their error is about
-  /// the square of the relative change.
+  /// Returns whether the speed changes so little that the parabolas hold at all times. Their error
+  /// is about the square of the relative change.
   bool isEven() const { return even_; }
-  /// A bound of the displacement between two times of the interval, pixels. Along parabolas the
-  /// speed of the fastest vote is convex in time: interpolated between the ends it is never too
-  /// small.
+  /// Returns an upper bound of the displacement between two times of the interval, pixels. Along
+  /// parabolas the speed of the fastest vote is convex in time, so linear interpolation between the
+  /// speeds at the ends is never too small.
   double between(std::int64_t t0_ns, std::int64_t t1_ns) const {
     const double middle_ns =
         0.5 * (static_cast<double>(t0_ns - start_ns_) + static_cast<double>(t1_ns - start_ns_));
@@ -78,11 +78,11 @@ class VoteDisplacement {
 };
 
 struct PosePacketsOptions {
-  /// The maximum error of a vote because its event shares a pose, in pixels of the reference view.
-  /// 0 gives every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI
-  /// near 2e-3 of its mass. A larger value saves at most 3 % of a keyframe's processor time: on the
-  /// simulated scenes 0.25 has the same depth errors, but on the real slider the paper's extraction
-  /// has 23.5 instead of 22.7 % wrong points already with 0.05.
+  /// Maximum error of a vote that results from a shared pose, in pixels of the reference view.
+  /// Range: 0 to 10; 0 gives every event its own pose. The default keeps the L1 error of the DSI
+  /// near 2e-3 of its mass. A larger value saves at most 3 % of a keyframe's processor time. On the
+  /// simulated scenes 0.25 has the same depth errors, but on the real slider recording 0.05 already
+  /// raises the wrong points of the paper's extraction from 22.7 to 23.5 %.
   double packet_error_px = 0.02;
 
   template <typename Self, typename Visit>
@@ -105,7 +105,7 @@ struct PosePackets {
   std::uint64_t without_pose = 0;
 };
 
-/// The reference view and the depth range that a packet's error is measured on.
+/// The reference view and the depth range on which a packet's error is measured.
 struct PacketGeometry {
   Rigid3 T_ref_world;
   ReferenceView view;
@@ -113,26 +113,26 @@ struct PacketGeometry {
   double farthest_depth_m = 0;
 };
 
-/// Splits events (time order, already shifted by the camera's time offset) into packets. A packet
-/// has the pose at the middle of its time; it ends where that pose would misplace a vote by more
-/// than the bound. No event is dropped because a packet is not full.
+/// Splits events into packets. The events are in time order and already shifted by the camera's
+/// time offset. A packet has the pose at the middle of its time. It ends where that pose would
+/// misplace a vote by more than the bound. Events of small packets are kept, too.
 ///
-/// The error is measured on a grid of rays over the whole sensor, at both ends of the packet, on
-/// the nearest and the farthest plane: a camera that rotates around a near point moves votes only
-/// on the planes behind it. In an interval of even motion the error is computed from the speed of
-/// the votes; this is exact to one percent, and more often too large than too small. A packet does
-/// not cross a recorded pose: the motion within it is one smooth piece, with its extremes at the
-/// ends. Rays far outside the view count only if no ray is near the view.
+/// The error is measured on a grid of rays over the whole sensor, at both ends of the packet. It is
+/// measured on the nearest and the farthest plane, because a camera that rotates around a near
+/// point moves votes only on the planes behind it. In an interval of even motion the error is
+/// computed from the speed of the votes; this is exact to 1 %, and more often too large than too
+/// small. A packet does not cross a recorded pose, so its motion is smooth, with the extremes at
+/// the ends. Rays far outside the view count only if no ray is near the view.
 PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,
                                  const PosePacketsOptions& options);
 
-/// One camera's events as rays of the reference view: each by its pixel on the plane at infinity,
-/// from which a scale and an offset lead to any other plane (`transferToPlane`).
+/// One camera's events as rays of the reference view. A ray is its pixel on the plane at infinity;
+/// a scale and an offset lead from it to the pixel on any other plane (`transferToPlane`).
 ///
-/// This is the first step of the transfer of Rebecq et al. (IJCV 2018, Eq. 15) with the plane at
-/// infinity for Z0: no camera centre can lie on it. Rays parallel to the planes get non-finite
+/// This is the first step of the transfer of Rebecq et al. (IJCV 2018, Eq. 15). Z0 is the plane at
+/// infinity, because no camera centre can lie on it. Rays parallel to the planes get non-finite
 /// coordinates and are never inside a view.
 struct RayBundle {
   std::vector<float> x_inf;  ///< Pixels of the reference view.
@@ -142,12 +142,12 @@ struct RayBundle {
   std::size_t size() const { return x_inf.size(); }
 };
 
-/// One camera's rays, one bundle per slot: a slot is a sub-interval of one group of events
+/// One camera's rays, one bundle per slot. A slot is a sub-interval of one group of events
 /// (`EventGroups`). All cameras of a sweep have the same number of slots.
 using CameraRays = std::vector<RayBundle>;
 
-/// Back-projects the events of the packets. Events between packets and outside the lens are left
-/// out. All events lie inside the sensor.
+/// Back-projects the events of the packets. Events between packets and events outside the lens are
+/// left out. All events must lie inside the sensor.
 RayBundle backProject(EventSpan events, const PosePackets& packets,
                       const UndistortionTable& undistortion, const ReferenceView& view);
 
