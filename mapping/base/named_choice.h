@@ -9,9 +9,9 @@
 
 namespace efm {
 
-/// Returns the known name nearest to a mistyped one: with the fewest letters missing, added,
-/// replaced or swapped with the next letter; the first of equal ones. At most a third of the longer
-/// name's letters may differ, but always one. Upper and lower case, '-' and '_' do not count.
+/// Returns the known name nearest to a mistyped name: with the fewest letters missing, added,
+/// replaced or swapped with the next letter; the first of several. At most a third of the longer
+/// name's letters, and at least one, may differ. Upper and lower case, '-' and '_' do not count.
 std::optional<std::string> nearestName(std::string_view typed,
                                        const std::vector<std::string>& known);
 

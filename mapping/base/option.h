@@ -92,7 +92,7 @@ struct Allowed {
   bool or_zero = false;            ///< 0 is allowed, too.
   bool only_odd = false;
   double unit = 1;  ///< The field's value for 1 in an option file. Limits have the file's unit.
-  bool in_files = true;  ///< false: no option file has this key.
+  bool in_files = true;  ///< False if no option file has this key.
 
   static Allowed from(double lowest, double highest, const char* expected) {
     return {lowest, highest, expected};

@@ -24,7 +24,7 @@ std::string encodeTiff(const cv::Mat1f& image);
 
 /// Returns whether the bytes begin as a PNG does.
 bool looksLikePng(std::string_view bytes);
-/// Returns whether the bytes begin as a TIFF does. A BigTIFF (for files above 4 GB) is one, too.
+/// Returns whether the bytes begin as a TIFF does, or as a BigTIFF (for files above 4 GB).
 bool looksLikeTiff(std::string_view bytes);
 
 /// Returns the pixels of a PNG or TIFF file, at most 2^26. PNG: 8 or 16 bits, grey, BGR or BGRA; a

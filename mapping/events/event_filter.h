@@ -80,7 +80,7 @@ class HotPixelFilter {
   }
 
  private:
-  // A count: events in the period of the pixel's row (high half) and in the one before (low half).
+  // A count: events in the row's period (high half) and in the period before it (low half).
   static constexpr unsigned kHalf = 16;
   static constexpr std::uint32_t kOneNewest = 1U << kHalf;
   static constexpr std::uint32_t kNewestFull = (kOneNewest - 1) << kHalf;

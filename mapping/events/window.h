@@ -43,7 +43,7 @@ enum class SubintervalSplit {
   kCount,     ///< The number of a camera's events, to within one.
 };
 
-/// Which sub-intervals of the cameras are fused with each other, in one slot.
+/// The sub-intervals of the cameras that are fused with each other, in one slot.
 enum class SubintervalShuffle {
   kNone,    ///< The same sub-intervals: simultaneous events.
   kShift,   ///< Each camera's sub-intervals are rotated by its own offset.

@@ -191,13 +191,13 @@ Eigen::Vector2d LensInverse::invertRadtan(const Eigen::Vector2d& distorted,
     const Eigen::Vector2d ray = newton(distorted, near);
     if (!std::isnan(ray.x())) return ray;
   }
-  // The Jacobian has no inverse at the end of the branch itself.
+  // The guess stays below the end of the branch, where the Jacobian has no inverse.
   const double rho = std::min(inverse_.guess(r), 0.99 * radial_.maxRho());
   return newton(distorted, rho / r * distorted);
 }
 
 /// Inverts the lens by Newton's method. The Jacobian is symmetric, so the ray is the minimum of a
-/// function that is convex on the branch: a step that does not come nearer is halved.
+/// function that is convex on the branch: a step that does not reduce the error is halved.
 Eigen::Vector2d LensInverse::newton(const Eigen::Vector2d& distorted, Eigen::Vector2d ray) const {
   constexpr int kMaxSteps = 50;
   constexpr int kMaxHalvings = 10;

@@ -120,8 +120,8 @@ class UndistortionTable {
     return rays_[row + static_cast<std::size_t>(x)].cast<double>();
   }
   bool hasRay(int x, int y) const { return !std::isnan(ray(x, y).x()); }
-  /// Returns the ray of pixel (x, y). If it has none: the ray of the first pixel that has one on
-  /// the line from (x, y) to the optical axis.
+  /// Returns the ray of pixel (x, y), or else the ray of the next pixel with a ray, on the line
+  /// from (x, y) to the optical axis.
   Eigen::Vector2d rayNear(int x, int y) const;
   /// Returns for each pixel, row-major, whether it lies outside the lens. Empty if no pixel does.
   std::vector<bool> outsideLens() const;

@@ -22,8 +22,7 @@ bool appendDigit(std::int64_t& value, int digit) {
   return true;
 }
 
-/// The digits of a decimal number without its point, and the position of the point: 0.d1 d2 d3 …
-/// times ten to the power of `point`.
+/// A decimal number: digits before and after the point, and the power of ten that multiplies it.
 struct DecimalDigits {
   std::string_view integer;
   std::string_view fraction;
@@ -83,7 +82,7 @@ std::optional<std::int64_t> parseTimeIn(std::string_view text, int exponent) {
   if (!digits) return std::nullopt;
   digits->exponent += exponent;
 
-  // Digits up to this index are whole nanoseconds; the next one rounds.
+  // Digits up to this index are whole nanoseconds; the next digit rounds.
   const std::int64_t whole =
       static_cast<std::int64_t>(digits->integer.size()) + digits->exponent + kNanosecondDigits;
   std::int64_t t_ns = 0;

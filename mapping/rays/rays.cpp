@@ -306,7 +306,7 @@ class BundleBuilder {
       const Eigen::Vector2f& ray = rayOf(events_[i]);
       x[end] = ray.x();
       y[end] = ray.y();
-      end += isRay(ray) ? 1 : 0;  // if it is no ray, the next one overwrites it
+      end += isRay(ray) ? 1 : 0;  // otherwise the next ray overwrites it
     }
     resize(end);
   }
