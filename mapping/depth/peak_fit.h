@@ -36,8 +36,8 @@ std::vector<float> maskedMedian(const SparseMask& mask, const std::vector<float>
                                 int window);
 
 /// The next functions use the parabola through the values of a DSI column at its peak, on the plane
-/// before and on the plane after. A negative value means that there is no such plane: the peak lies
-/// on the first or the last plane.
+/// before and on the plane after. If the peak lies on the first or last
+/// plane, a neighbour is missing: its value is then negative.
 
 /// Returns the position of the parabola's top, in planes, at most half a plane from the peak; the
 /// peak's own plane if there is no curvature or a neighbour is missing.

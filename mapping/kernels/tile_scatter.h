@@ -84,7 +84,7 @@ struct CellBuffer {
   std::uint8_t* dirty = nullptr;
 };
 
-/// The cells of a tile that votes may fall into.
+/// The cells of a tile into which votes may fall.
 struct CellWindow {
   CellBuffer tile;
   std::uint32_t first = 0;         ///< Index of the window's first cell in the tile.

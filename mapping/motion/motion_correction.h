@@ -35,8 +35,9 @@ Eigen::VectorXd minimise(
 /// is the one with the sharpest images of warped events (contrast maximization: Gallego et al.,
 /// CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.2, interpret DSIs as these images).
 ///
-/// It needs several cameras: with a single camera, wrong depths explain a wrong motion as well. It
-/// is for trackers with errors within a window; it does not improve exact poses.
+/// The correction needs several cameras: the images of a single camera are sharp also for a wrong
+/// motion with wrong depths. It is for trackers with errors within a window; it does not improve
+/// exact poses.
 struct MotionCorrectionOptions {
   bool correct_motion = false;
   /// Standard deviations of the tracker's velocity error on each axis; they keep the correction

@@ -41,7 +41,7 @@ struct PoseFinding {
   PoseMistake mistake = PoseMistake::kUnknown;
   /// Without the mistake, the events are this many times as sharp.
   double gain = 1;
-  /// Further mistakes that explain the events as well; each once.
+  /// Other mistakes that explain the events equally well, without duplicates.
   std::vector<PoseMistake> alternatives;
   /// `kAxes`: the poses are T_world_body, and T_world_rig = T_world_body * T_body_rig.
   Eigen::Matrix3d R_body_rig = Eigen::Matrix3d::Identity();

@@ -51,7 +51,7 @@ struct SweepRequest {
   int column_window = 0;
 };
 
-/// @param groups divides the number of slots (asserted).
+/// @param groups of slots that are fused separately; the number of slots is a multiple (asserted).
 FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups);
 
 struct SweepResult {

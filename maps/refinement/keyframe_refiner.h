@@ -93,9 +93,9 @@ class LoopCloser {
 /// The first keyframe keeps its pose by the tracker. Without a plausible registration the motion of
 /// the tracker is kept.
 ///
-/// Deterministic. Cost of a keyframe: registrations of a bounded number of points, one window, and
-/// loops in proportion to their length, spread over the keyframes. Memory: 48 bytes per point. Not
-/// thread-safe.
+/// Deterministic. A keyframe costs registrations of a bounded number of points and one window. The
+/// cost of a loop is proportional to its length and is spread over the keyframes. Memory: 48 bytes
+/// per point. Not thread-safe.
 class KeyframeRefiner {
  public:
   explicit KeyframeRefiner(const RefinementOptions& options);

@@ -30,7 +30,7 @@ class GzStream : public mrpt::io::CStream {
   void close();
 
   /// @return the number of bytes; it is less than `count` only at the end of the file.
-  /// @throws std::runtime_error as `atEnd`.
+  /// @throws std::runtime_error if the file is truncated or its compression is damaged.
   std::size_t Read(void* buffer, std::size_t count) override;
   std::size_t Write(const void* buffer, std::size_t count) override;
   std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.

@@ -103,7 +103,8 @@ class InputQueue {
 
     /// Takes a new time. The clock may go back.
     void follow(std::int64_t t_ns);
-    /// Ends the wait of `ahead`. @return it, if its time is right; otherwise it counts as rejected.
+    /// Ends the wait of the input `ahead` and returns it if its time is right. Otherwise adds 1 to
+    /// `rejected` and returns std::nullopt.
     std::optional<Input> finalize(bool is_right, std::uint64_t& rejected);
     /// Ends the wait at the end of the input.
     std::optional<Input> finalizeLast(std::uint64_t& rejected);

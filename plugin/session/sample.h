@@ -50,7 +50,7 @@ struct PoseSample {
 /// Any other content of a rawlog.
 struct OtherSample {
   std::string type;                  ///< Name of its class.
-  std::optional<std::int64_t> t_ns;  ///< std::nullopt if it has no time.
+  std::optional<std::int64_t> t_ns;  ///< std::nullopt if the observation has no time.
   std::shared_ptr<const void> original;
 };
 

@@ -134,8 +134,8 @@ class FrameRenderer {
   /// @param frame its memory is reused if it has the right size.
   void render(const SceneView& view, Frame& frame) const;
 
-  /// Returns the surface point that causes a change of brightness at a pixel: its centre's point.
-  /// On a silhouette it is the nearest point within the pixel: the front surface has the edge.
+  /// Returns the surface point that causes a change of brightness at a pixel: the point seen at the
+  /// pixel's centre. On a silhouette it is the nearest point within the pixel.
   SurfacePoint sourceOf(const SceneView& view, const Frame& frame, int x, int y) const;
 
  private:

@@ -30,8 +30,8 @@ struct RecordingSource {
   /// Calibration and hand-eye transform, if they were read already.
   std::shared_ptr<const RigSetup> setup = nullptr;
   TrackerFaults faults;  ///< Faults of the poses of trackers (PoseKind::kPose).
-  /// True if calibration and hand-eye transform replace those of the samples. If false, they are
-  /// used only if the recording has none, and a mapping's options replace the recording's own.
+  /// True if the given calibration and hand-eye transform replace those of the recording. If false,
+  /// they are used only if the recording has none: the mapping's options replace the others later.
   bool override_rig = true;
   /// True if `roundedPose` rounds the poses of trackers and cameras. A rawlog writer rounds itself.
   bool rounded = true;
