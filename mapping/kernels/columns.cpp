@@ -23,7 +23,7 @@ void add(float* sum, const std::uint8_t* roots, std::size_t planes, float unit) 
     const auto below =
         hn::ConvertTo(d, hn::PromoteTo(d_signed, hn::LoadU(d_narrow, roots + plane)));
     const auto value = hn::NegMulAdd(below, below, peak);  // exact
-    // No fused multiplication: all kernels give the same bits.
+    // No fused multiply-add, so that all kernels give the same bits.
     hn::StoreU(hn::Add(hn::LoadU(d, sum + plane), hn::Mul(units, value)), d, sum + plane);
   }
 }

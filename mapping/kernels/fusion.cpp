@@ -12,8 +12,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kSmallest = std::numeric_limits<float>::min();
 
 // A rule is the start of a sum and three small functions: `fold` adds an input to the sum, `finish`
-// turns the sum of n inputs into their mean, and `pair` is the mean of two. Zeros need no branch in
-// the first two: IEEE arithmetic carries 1/0 and log 0 to a mean of zero.
+// turns the sum of n inputs into their mean, and `pair` is the mean of two inputs. Zeros need no
+// branch in `fold` and `finish`: in IEEE arithmetic, 1/0 and log 0 lead to a mean of zero.
 
 /// Ghosh and Gallego 2022, Eq. 10.
 struct Min {
@@ -28,8 +28,8 @@ struct Harmonic {
   static constexpr float kStart = 0;
   static float fold(float sum, float value) { return sum + 1.0F / value; }
   static float finish(float sum, float inputs) { return inputs / sum; }
-  /// 2ab / (a + b) with one division, without a product that could leave the range of floats and
-  /// without a branch for 0/0.
+  /// Returns 2ab / (a + b) with one division. No product can leave the range of floats, and 0/0
+  /// needs no branch.
   static float pair(float a, float b) {
     const float low = std::min(a, b);
     const float high = std::max(a, b);

@@ -30,8 +30,8 @@
 //   #endif
 //
 // The kernel is an argument, not Highway's global choice, so that tests and threads can run several
-// side by side. Highway's baseline may have vectors of one lane: use only functions that exist
-// there.
+// kernels side by side. Highway's baseline may have vectors of one lane: use only functions that
+// exist for one lane.
 
 #ifdef HIGHWAY_HWY_DETECT_TARGETS_H_
 #error "include highway_targets.h before anything of Highway"
@@ -79,13 +79,13 @@
 #define EFM_VECTOR_KERNELS(name)                                                    \
   EFM_BASELINE_OF(name), EFM_SSE4_OF(name), EFM_AVX2_OF(name), EFM_AVX512_OF(name), \
       EFM_NEON_OF(name)
-/// A KernelTable of `plain` and of these.
+/// A KernelTable of `plain` and of the objects of EFM_VECTOR_KERNELS.
 #define EFM_KERNEL_TABLE(plain, name) \
   { &(plain), EFM_VECTOR_KERNELS(name) }
 
 namespace efm::kernels {
 
-/// One kernel's functions per `VotingKernel`, in its order; null where this build has none.
+/// One kernel's functions for each `VotingKernel`, in the order of the enum; null if none.
 template <typename Functions>
 using KernelTable = std::array<const Functions*, 6>;
 

@@ -22,7 +22,7 @@ constexpr Target kTargets[] = {
 }  // namespace
 
 std::vector<VotingKernel> availableKernels() {
-  // The compiler's own baseline always runs, even where Highway's build did not detect it.
+  // The compiler's own baseline always runs, even if Highway's build did not detect it.
   const std::int64_t runnable = (HWY_SUPPORTED_TARGETS | HWY_STATIC_TARGET) & HWY_TARGETS;
   std::vector<VotingKernel> kernels = {VotingKernel::kPlain};
   for (const Target& target : kTargets) {

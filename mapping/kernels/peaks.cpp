@@ -13,17 +13,17 @@ HWY_BEFORE_NAMESPACE();
 namespace efm::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Stores the value's lanes where the mask says so.
+/// Stores the lanes of `value` for which the mask is true.
 template <class D, class M>
 HWY_INLINE void storeWhere(D d, M where, hn::Vec<D> value, hn::TFromD<D>* to) {
 #if HWY_TARGET == HWY_AVX3
-  // Masked stores are cheap here alone. A vector of one lane must not use them: its mask has more.
+  // Masked stores are cheap only here. One-lane vectors must not use them: the mask has more lanes.
   if constexpr (hn::MaxLanes(D()) > 1) return hn::BlendedStore(value, where, d, to);
 #endif
   hn::StoreU(hn::IfThenElse(where, value, hn::LoadU(d, to)), d, to);
 }
 
-/// Pixels [i, n) by whole vectors of the tag's lanes. @return the first pixel left.
+/// Adds pixels [i, n) in whole vectors of the tag's lanes. @return the first pixel that is left.
 template <class D>
 HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
                              std::int32_t plane, const float* values) {
@@ -36,7 +36,7 @@ HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays
     const auto previous = hn::LoadU(d, peaks.previous + i);
     const auto better = hn::Gt(value, hn::LoadU(d, peaks.best + i));
     const auto follows = hn::RebindMask(d, hn::Eq(hn::LoadU(d_plane, peaks.plane + i), last_plane));
-    // No branch where no lane changes: noise makes it unpredictable, and that costs more.
+    // No branch skips unchanged vectors: noise makes it unpredictable, and that costs more.
     storeWhere(d, better, value, peaks.best + i);
     storeWhere(d_plane, hn::RebindMask(d_plane, better), this_plane, peaks.plane + i);
     storeWhere(d, better, previous, peaks.before + i);
@@ -46,7 +46,7 @@ HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays
   return i;
 }
 
-// Full vectors first, then the rest in vectors of one lane.
+// Adds full vectors first, then the rest in vectors of one lane.
 void add(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
   const std::size_t done = addBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
   addBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);

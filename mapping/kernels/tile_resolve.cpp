@@ -27,9 +27,9 @@ using UnsignedV = hn::Vec<Unsigned>;
 
 constexpr float kUnit = 1.0F / (1 << kWeightBits);
 
-/// The weights that a row of cells has for a vector of pixels: for the pixels above the row in the
-/// lower 16 bits, for those below it in the upper ones.
-/// @param cells the first one, left of the first pixel.
+/// Returns the weights that a row of cells has for a vector of pixels. The lower 16 bits are for
+/// the pixels above the row, the upper 16 bits for the pixels below.
+/// @param cells the first cell, left of the first pixel.
 HWY_INLINE UnsignedV weightsOf(const std::uint64_t* cells) {
   const Unsigned d;
 #if HWY_TARGET == HWY_SCALAR
@@ -39,8 +39,8 @@ HWY_INLINE UnsignedV weightsOf(const std::uint64_t* cells) {
   const Cells d64;
   const std::size_t half = hn::Lanes(d64);
   const auto load = [&](const std::uint64_t* from) { return hn::BitCast(d, hn::LoadU(d64, from)); };
-  // A cell's upper half is for the pixels on its right, the lower half for those on its left. No
-  // sum has its top bit, so none overflows.
+  // A cell's upper half is for the pixels on its right, the lower half for the pixels on its left.
+  // The top bit of each sum is zero, so no addition overflows.
   return hn::Add(hn::ConcatOdd(d, load(cells + half), load(cells)),
                  hn::ConcatEven(d, load(cells + 1 + half), load(cells + 1)));
 #endif
@@ -64,19 +64,19 @@ HWY_INLINE std::uint64_t sumOfLanes(D d, V values) {
 
 // ---------------------------------------------------------------- columns of pixels
 
-/// Resolves a vector of a tile's columns of pixels downwards, and clears the cells to their left.
+/// Resolves a vector of a tile's pixel columns downwards, and clears the cells left of the pixels.
 class ColumnResolver {
  public:
-  /// @param cells of the first row, to the left of the first pixel. @param within the lanes inside
-  /// the tile.
+  /// @param cells the first row, from the cell left of the first pixel. @param within the lanes
+  /// inside the tile.
   template <class Mask>
   HWY_INLINE ColumnResolver(std::uint64_t* cells, Mask within)
       : cells_(cells), within_(hn::VecFromMask(Unsigned(), within)) {
-    next();  // of the pixels above the tile
+    next();  // skips the pixels above the tile
     units_ = hn::Zero(Unsigned());
   }
 
-  /// The weights of the next row of pixels, in units.
+  /// Returns the weights of the next row of pixels, in units.
   HWY_INLINE FloatV next() {
     const Cells d;
     const UnsignedV weights = weightsOf(cells_);
@@ -89,7 +89,7 @@ class ColumnResolver {
     units_ = hn::Add(units_, hn::And(within_, sum));
     return floatsOf(sum);
   }
-  /// The sum over all pixels so far.
+  /// Returns the sum over all pixels so far, in units.
   std::uint64_t units() const { return sumOfLanes(Unsigned(), units_); }
 
  private:
@@ -99,7 +99,7 @@ class ColumnResolver {
   UnsignedV from_above_ = hn::Zero(Unsigned());  // the weights of the cells above
 };
 
-/// Clears the cells to the right of the last pixels, where no vector of columns begins there.
+/// Clears the cells to the right of the last pixels if no vector of columns includes them.
 HWY_INLINE void clearLast(std::uint64_t* cells, int width, int height) {
   if (width % static_cast<int>(hn::Lanes(Unsigned())) != 0) return;
   for (int row = 0; row <= height; ++row) cells[row * kTileCells + width] = 0;
@@ -131,8 +131,8 @@ std::uint64_t resolveAll(std::uint64_t* cells, int width, int height, float* val
 
 // ---------------------------------------------------------------- pairs
 
-// The means of two of `fusion.cpp`, with the same bits, from numbers in units: these are powers of
-// two, so nothing is rounded.
+// The means of two inputs in units, with the same bits as in `fusion.cpp`. A unit is a power of
+// two, so its factor rounds nothing.
 
 struct Min {
   static HWY_INLINE FloatV mean(FloatV a, FloatV b) {
@@ -156,7 +156,7 @@ struct Geometric {
   }
 };
 
-/// All pixels, by columns.
+/// Adds the means of all pixels, by columns.
 template <class Rule>
 void addAll(std::uint64_t* first, std::uint64_t* second, int width, int height, float* sum,
             std::uint64_t units[2]) {
@@ -177,24 +177,24 @@ void addAll(std::uint64_t* first, std::uint64_t* second, int width, int height, 
   clearLast(second, width, height);
 }
 
-/// A byte for each line of a row of pixels; not zero if one of its cells may have votes: cells
-/// of the rows above and below, of the line and of the next one.
+/// Returns a byte for each line of a row of pixels. It is not zero if a neighbouring cell may have
+/// votes: a cell of the rows above and below, in this line or the next one.
 HWY_INLINE std::uint64_t linesWithVotes(const std::uint8_t* dirty, int row) {
   constexpr int kLinesInRow = kTileCells / kLineCells;
   std::uint64_t rows[2];
   static_assert(kLinesInRow == sizeof(rows[0]));
   std::memcpy(rows, dirty + static_cast<std::ptrdiff_t>(row) * kLinesInRow, sizeof(rows));
   const std::uint64_t lines = rows[0] | rows[1];
-  return lines | lines >> 8;  // lowest bits first, on all processors that there are kernels for
+  return lines | lines >> 8;  // little-endian, as all processors with kernels are
 }
 
-/// Clears the marked lines and their marks. @return the weights that pixels of the tile had.
+/// Clears the marked lines and their marks. @return the sum of the tile's weights, in units.
 std::uint64_t clearMarked(const CellBuffer& buffer, int width, int height) {
   constexpr int kLinesInRow = kTileCells / kLineCells;
   constexpr std::uint64_t kUpper = 0x0000'FFFF'0000'FFFFU;  // weights for upper pixels
   const Cells d;
-  auto units = hn::Zero(d);     // by halves: of left and of right pixels
-  std::uint64_t of_border = 0;  // of pixels left and right of the tile
+  auto units = hn::Zero(d);     // lower half: left pixels, upper half: right pixels
+  std::uint64_t of_border = 0;  // weights of pixels left and right of the tile
   for (int row = 0; row <= height; ++row) {
     std::uint8_t* dirty = buffer.dirty + static_cast<std::ptrdiff_t>(row) * kLinesInRow;
     std::uint64_t* cells = buffer.cells + static_cast<std::ptrdiff_t>(row) * kTileCells;
@@ -222,13 +222,13 @@ std::uint64_t clearMarked(const CellBuffer& buffer, int width, int height) {
          of_border;
 }
 
-/// The weights that pixels from x on have, in units, from the cells of both rows.
+/// Returns the weights of the pixels from x on, in units, from the rows of cells above and below.
 HWY_INLINE FloatV unitsAt(const std::uint64_t* cells, int row, int x) {
   const std::uint64_t* above = cells + static_cast<std::ptrdiff_t>(row) * kTileCells + x;
   return floatsOf(hn::Add(toBelow(weightsOf(above)), toAbove(weightsOf(above + kTileCells))));
 }
 
-/// Pixels in lines where both have votes.
+/// Adds the means of pixels in lines where both inputs have votes.
 template <class Rule>
 int addMarked(const CellBuffer& first, const CellBuffer& second, int width, int height, float* sum,
               std::uint64_t units[2]) {
@@ -237,7 +237,7 @@ int addMarked(const CellBuffer& first, const CellBuffer& second, int width, int 
   constexpr int kLinesOfVector = (kLanes + kLineCells - 1) / kLineCells;
   int pixels = 0;
   for (int row = 0; row < height; ++row, sum += width) {
-    // The mean is zero where one of the two is.
+    // The mean is zero if one of the two inputs is zero.
     const std::uint64_t lines =
         linesWithVotes(first.dirty, row) & linesWithVotes(second.dirty, row);
     if (lines == 0) continue;

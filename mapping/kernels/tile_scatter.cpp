@@ -21,13 +21,13 @@ using FloatV = hn::Vec<Floats>;
 using UnsignedV = hn::Vec<Unsigned>;
 
 constexpr std::uint32_t kFractionMask = (1U << kFractionBits) - 1;
-constexpr std::uint32_t kUnits = 1U << kWeightBits;  // of a vote
+constexpr std::uint32_t kUnits = 1U << kWeightBits;  // units of a vote
 constexpr std::uint64_t kFullCell = 0x8000'8000'8000'8000U;
-/// After this number of votes cells are looked at. No sum can leave its field before.
+/// After this number of votes, cells are checked. Before that, no sum can overflow its field.
 constexpr std::size_t kVotesUnseen = kVotesPerCell;
 static_assert(0x7FFF + kVotesUnseen * kUnits <= 0xFFFF && kVotesPerCell * kUnits == 0x8000);
 
-/// Adding 2^23 leaves a float's value, rounded, in its last bits.
+/// Adding 2^23 to a float leaves its rounded value in the last bits.
 constexpr float kToBits = 8388608.0F;
 constexpr std::uint32_t kBitsOfZero = 0x4B000000U;
 
@@ -55,7 +55,7 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
     const auto along = hn::And(hn::Ge(hn::Max(y0, y1), set(request.top)),
                                hn::Lt(hn::Min(y0, y1), set(request.bottom)));
     const auto near = hn::And(hn::And(across, along), hn::FirstN(d, count - i));
-    // Whole vectors are stored, into the padding: compressing right into memory is slower.
+    // Whole vectors are stored, also into the padding: compressing directly into memory is slower.
     const auto append = [&](FloatV values, float* to) {
       hn::StoreU(hn::Compress(values, near), d, to + size);
     };
@@ -72,14 +72,14 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
 
 // ---------------------------------------------------------------- voting
 
-/// The weights of votes for the two left pixels and for the two right ones, the upper pixel in the
-/// lower half.
+/// The weights of votes for the two left and the two right pixels. The upper pixel's weight is in
+/// the lower 16 bits.
 struct Weights {
   UnsignedV left, right;
 };
 
-/// @param x, y positions in cells: the last bits are fractions. @param inside where not, weights
-/// are zero.
+/// @param x, y positions in cells; the last kFractionBits bits are fractions. @param inside if
+/// false, the weights are zero.
 template <class Mask>
 HWY_INLINE Weights weightsOf(UnsignedV x, UnsignedV y, Mask inside) {
   const Unsigned d;
@@ -96,7 +96,7 @@ HWY_INLINE Weights weightsOf(UnsignedV x, UnsignedV y, Mask inside) {
   const UnsignedV right =
       hn::IfThenElseZero(inside, hn::Or(toRight(upper), hn::ShiftLeft<16>(toRight(lower))));
 #else
-  // Pairs of 16 bits. Products of them are rounded.
+  // Pairs of 16-bit numbers. Their products are rounded.
   const hn::Repartition<std::int16_t, Unsigned> d16;
   const hn::Repartition<std::uint8_t, Unsigned> d8;
   HWY_ALIGN static constexpr std::uint8_t kLowerHalfTwice[16] = {0, 1, 0, 1, 4,  5,  4,  5,
@@ -120,16 +120,16 @@ HWY_INLINE Weights weightsOf(UnsignedV x, UnsignedV y, Mask inside) {
   return {hn::Sub(both, right), right};
 }
 
-/// A batch of votes: vectors write it, and it is read one by one. It stays in the first-level
-/// cache.
+/// A batch of votes. Votes are written as vectors and read one by one. The batch stays in the
+/// first-level cache.
 struct VoteBatch {
   static constexpr std::size_t kSize = 128;
   HWY_ALIGN std::uint32_t index[kSize] = {};
   HWY_ALIGN std::uint64_t sums[kSize];
 };
 
-/// Stores 64-bit values from their halves. A vector of four or more lanes changes their order:
-/// `laneOf` gives it.
+/// Stores 64-bit values from their halves. A vector of four or more lanes changes the order of the
+/// values: see `laneOf`.
 HWY_INLINE void storeHalves(UnsignedV lower, UnsignedV upper, std::uint64_t* values) {
 #if HWY_TARGET == HWY_SCALAR
   *values = hn::GetLane(lower) | static_cast<std::uint64_t>(hn::GetLane(upper)) << 32;
@@ -141,7 +141,7 @@ HWY_INLINE void storeHalves(UnsignedV lower, UnsignedV upper, std::uint64_t* val
 #endif
 }
 
-/// The lane that the k-th stored value came from.
+/// Returns the lane of the k-th stored value.
 HWY_INLINE std::size_t laneOf(std::size_t k, std::size_t lanes) {
   if (lanes == 1) return 0;
   const std::size_t half = lanes / 2;
@@ -149,7 +149,7 @@ HWY_INLINE std::size_t laneOf(std::size_t k, std::size_t lanes) {
   return in_half / 2 * 4 + in_half % 2 + (k < half ? 0 : 2);
 }
 
-/// Encodes the votes of a vector of rays: the index of a cell and the numbers to add to it.
+/// Encodes the votes of a vector of rays: the index of each vote's cell, and the sums to add to it.
 class VoteEncoder {
  public:
   VoteEncoder(const MovingRays& rays, float to_plane, const CellWindow& window)
@@ -166,7 +166,7 @@ class VoteEncoder {
     const UnsignedV x = fixedPoint(rays_.x + ray, rays_.dx + ray, left_);
     const UnsignedV y = fixedPoint(rays_.y + ray, rays_.dy + ray, top_);
     const auto inside = hn::And(hn::Lt(x, width_), hn::Lt(y, height_));
-    // A ray outside adds zero to a cell of the tile.
+    // A ray outside the window adds zero to a cell of the tile.
     const UnsignedV cell = hn::And(hn::Add(hn::ShiftLeft<6>(hn::ShiftRight<kFractionBits>(y)),
                                            hn::ShiftRight<kFractionBits>(x)),
                                    hn::Set(du, kTileCells * kTileCells - 1));
@@ -181,7 +181,7 @@ class VoteEncoder {
     return kBitsOfZero + (static_cast<std::uint32_t>(cell) << kFractionBits);
   }
 
-  /// A coordinate from the window's edge. Left of the edge it wraps around and is huge.
+  /// Returns coordinates from the window's edge. A coordinate before the edge wraps and is huge.
   HWY_INLINE UnsignedV fixedPoint(const float* start, const float* shift, UnsignedV edge) const {
     const Floats d;
     const FloatV position = hn::MulAdd(to_plane_, hn::Load(d, shift), hn::Load(d, start));
@@ -193,7 +193,7 @@ class VoteEncoder {
   UnsignedV left_, top_, width_, height_, first_;
 };
 
-/// Moves full cells that some votes fell into to the list.
+/// Moves full cells to the list. @param index the cells of the last kVotesUnseen votes.
 HWY_INLINE FullCell* takeFull(const std::uint32_t* index, std::uint64_t* cells, FullCell* full) {
   for (std::size_t vote = 0; vote < kVotesUnseen; ++vote) {
     std::uint64_t& cell = cells[index[vote]];
