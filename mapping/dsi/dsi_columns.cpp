@@ -48,8 +48,8 @@ namespace {
 
 constexpr float kRootsPerPeak = 8191;
 
-/// The bytes of values from 0 to a column's peak, in steps of 1/kRootsPerPeak: to compute each root
-/// is slower.
+/// The bytes of values from 0 to a column's peak, in steps of 1/kRootsPerPeak of the peak.
+/// Computing each root is slower.
 using RootTable = std::array<std::uint8_t, static_cast<std::size_t>(kRootsPerPeak) + 1>;
 
 RootTable makeRootTable() {
@@ -61,9 +61,9 @@ RootTable makeRootTable() {
   return table;
 }
 
-/// The pixels of a tile that stand out from their surroundings.
+/// Returns the pixels of a tile whose confidence is above that of their surroundings.
 std::vector<cv::Point> standingOut(const cv::Mat1f& confidence, int window) {
-  // Isolated: other threads may be writing the pixels around the tile.
+  // Isolated, because other threads may be writing the pixels around the tile.
   cv::Mat1f surroundings;
   cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0,
                    cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
@@ -92,7 +92,7 @@ void TileVolume::setPlane(int plane, const PlaneValues& values) {
 DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confidence,
                                     const TileVolume& volume, int planes, int window) {
   Tile columns;
-  std::vector<std::size_t> indices;  // of pixels in the tile's planes
+  std::vector<std::size_t> indices;  // of the pixels, in a plane of the tile
   std::vector<float> to_index;
   const std::vector<cv::Point> pixels = standingOut(confidence, window);
   columns.pixels.reserve(pixels.size());
@@ -106,7 +106,7 @@ DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confi
   static const RootTable roots = makeRootTable();
   const auto length = static_cast<std::size_t>(planes);
   columns.roots.resize(indices.size() * length + kernels::kColumnPadding);
-  // Few planes at a time, so that their lines stay in the first-level cache for the next pixels.
+  // Only a few planes at a time: their lines stay in the first-level cache for the next pixels.
   constexpr int kPlanes = 32;
   for (int begin = 0; begin < planes; begin += kPlanes) {
     const int end = std::min(begin + kPlanes, planes);
@@ -133,7 +133,7 @@ DsiColumns::DsiColumns(cv::Size view, int planes, std::vector<Tile> tiles)
       index_(cv::Point(tile.pixels[i])) = static_cast<int>(columns_.size());
       columns_.push_back({roots, tile.units[i]});
     }
-    roots_.push_back(std::move(tile.roots));  // stay where they are
+    roots_.push_back(std::move(tile.roots));  // the values keep their addresses
     tile = {};
   }
 }

@@ -17,27 +17,27 @@ namespace kernels {
 struct PeakFunctions;
 }  // namespace kernels
 
-/// The peak of the DSI in the column of every pixel: images of the view's size. Where whole columns
-/// are stored (`DsiColumns`), which have the other values, there is the confidence alone.
+/// The peak of the DSI in the column of every pixel: images of the view's size. If whole columns
+/// are stored (`DsiColumns`), only the confidence is filled: columns have the other values.
 struct DsiPeaks {
-  cv::Mat1f confidence;  ///< The largest fused value; 0 if nothing voted.
-  cv::Mat1i plane;       ///< Its plane; of equals the nearest.
+  cv::Mat1f confidence;  ///< The largest fused value; 0 if the pixel has no votes.
+  cv::Mat1i plane;       ///< The plane of this value; the nearest one if several are equal.
   cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
   cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
 };
 
-/// Images of a view's size whose pixels have no values yet. @param confidence_alone the others stay
-/// empty.
+/// Returns images of a view's size whose pixels have no values yet. @param confidence_alone if
+/// true, the other images are empty.
 DsiPeaks unwrittenPeaks(const ReferenceView& view, bool confidence_alone = false);
 
 /// The peak of each pixel of a tile over the planes added so far: the argmax of the DSI (Ghosh and
 /// Gallego 2022, Algorithm 1, line 5), and the values one plane before and after it.
 class RunningPeaks {
  public:
-  /// @param kernel an available one; every kernel gives the same bits.
+  /// @param kernel one of `availableKernels`; all kernels give the same bits.
   explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel());
 
-  /// Planes in increasing order, without a gap.
+  /// Adds a plane. Planes are added in increasing order, without a gap.
   void add(int plane, const PlaneValues& values);
   /// Writes the tile, row by row, to its position in the images that are not empty. Several threads
   /// may write tiles that do not overlap.
@@ -49,7 +49,7 @@ class RunningPeaks {
   PlaneValues before_;
   PlaneValues after_;
   PixelValues<std::int32_t> plane_;
-  PlaneValues previous_;  // the plane added last
+  PlaneValues previous_;  // values of the plane added last
 };
 
 /// The fused values of all planes on one tile of the view: plane by plane, each row-major.
@@ -69,23 +69,23 @@ class TileVolume {
   PlaneValues values_;
 };
 
-/// Columns of the fused DSI: the values of a pixel on all planes. Only pixels that may become
-/// points have one: their confidence is above that of their surroundings. They are a third of a
-/// view at most in practice, and the only part of the DSI that is stored. A value takes a byte
-/// (`kernels::columnValue`), which moves no depth that matters: with 100 to 400 planes, points and
-/// errors are as with two bytes. With many more, neighbouring planes share a byte:
+/// Columns of the fused DSI. A column has the values of one pixel on all planes. Only pixels that
+/// may become points have a column: their confidence is above that of their surroundings. In
+/// practice, such pixels are at most a third of a view. Only columns of the DSI are stored. A value
+/// takes one byte (`kernels::columnValue`): with 100 to 400 planes, points and errors are like
+/// those with two bytes. With many more planes, neighbouring planes have the same byte:
 /// `aggregateColumns` then compares planes that are further apart.
 class DsiColumns {
  public:
   /// Columns of one tile.
   struct Tile {
-    std::vector<cv::Point_<std::uint16_t>> pixels;  // of the view
-    std::vector<float> units;                       // per pixel
+    std::vector<cv::Point_<std::uint16_t>> pixels;  // coordinates in the view
+    std::vector<float> units;                       // the value of each column's unit
     std::vector<std::uint8_t> roots;                // [pixel][plane], with kernels::kColumnPadding
   };
-  /// Selects the columns of a tile whose confidence is above the Gaussian mean around it. Where the
+  /// Selects the columns of a tile whose confidence is above the Gaussian mean around it. If the
   /// window crosses the tile's edge, every pixel with votes has a column.
-  /// @param confidence of the tile's pixels. @param window side of the Gaussian window, odd.
+  /// @param confidence one value per pixel. @param window side of the Gaussian window, pixels, odd.
   static Tile select(const cv::Rect& tile, const cv::Mat1f& confidence, const TileVolume& volume,
                      int planes, int window);
 
@@ -97,13 +97,13 @@ class DsiColumns {
   int planes() const { return planes_; }
   std::size_t size() const { return columns_.size(); }
   bool has(cv::Point pixel) const { return index_(pixel) >= 0; }
-  /// @param pixel has a column.
+  /// @param pixel a pixel that has a column.
   float value(cv::Point pixel, int plane) const {
     const Column& column = columns_[static_cast<std::size_t>(index_(pixel))];
     return column.unit * kernels::columnValue(column.roots[plane]);
   }
-  /// sum[plane] += weight * value(pixel, plane) for all planes.
-  /// @param sum with kernels::kColumnPadding.
+  /// Adds weight * value(pixel, plane) to sum[plane] for all planes.
+  /// @param sum one value per plane, with kernels::kColumnPadding.
   void addTo(float* sum, cv::Point pixel, float weight) const;
 
  private:
@@ -113,7 +113,7 @@ class DsiColumns {
   };
 
   int planes_ = 0;
-  std::vector<std::vector<std::uint8_t>> roots_;  // of the tiles
+  std::vector<std::vector<std::uint8_t>> roots_;  // by tile
   std::vector<Column> columns_;
   cv::Mat1i index_;  // index in columns_; -1 if there is none
   const kernels::ColumnFunctions* functions_ = nullptr;
@@ -122,7 +122,7 @@ class DsiColumns {
 /// The result of a sweep for one DSI.
 struct SweptDsi {
   DsiPeaks peaks;
-  DsiColumns columns;  ///< Filled if asked for.
+  DsiColumns columns;  ///< Empty if not requested.
 };
 
 }  // namespace efm

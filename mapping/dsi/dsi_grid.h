@@ -15,8 +15,8 @@
 
 namespace efm {
 
-/// One value per pixel of a plane or of a tile of it, row-major. Begins on a cache line, so that
-/// no vector lies in two lines.
+/// One value per pixel of a plane or of a tile of it, row-major. Its memory begins with a cache
+/// line, so that no vector crosses two lines.
 template <typename Value>
 using PixelValues = std::vector<Value, tbb::cache_aligned_allocator<Value>>;
 using PlaneValues = PixelValues<float>;
@@ -34,7 +34,7 @@ void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
 struct VoteCounts {
   std::uint64_t cast = 0;
   std::uint64_t outside_view = 0;   ///< Votes that have a neighbouring pixel outside the view.
-  std::uint64_t behind_camera = 0;  ///< The plane point is behind the camera that saw the event.
+  std::uint64_t behind_camera = 0;  ///< Votes whose point is behind the camera that saw the event.
 
   std::uint64_t total() const { return cast + outside_view + behind_camera; }
   VoteCounts& operator+=(const VoteCounts& other) {
@@ -51,16 +51,16 @@ struct DsiGrid {
   DepthPlanes planes;
 };
 
-/// "plain", "baseline", "sse4", "avx2", "avx512", "neon".
+/// Returns "plain", "baseline", "sse4", "avx2", "avx512" or "neon".
 std::string_view nameOf(VotingKernel kernel);
-/// Accepts kernels that this processor lacks.
+/// Accepts also the names of kernels that this processor lacks.
 VotingKernel votingKernelFromName(std::string_view name);
 
-/// The kernels that this build has and this processor can run, plain first.
+/// Returns the kernels of this build that this processor can run, plain first.
 const std::vector<VotingKernel>& availableKernels();
 bool isAvailable(VotingKernel kernel);
 
-/// The fastest of some kernels, plain among them. Measured, as a multiple of plain's speed:
+/// Returns the fastest of some kernels, or plain. Measured speeds, as multiples of plain's:
 /// baseline 0.6 to 1, SSE4 2 to 2.2, AVX2 2.2 to 2.6, AVX-512 3.2 to 4.6 (docs/performance.md).
 /// NEON has not been measured: its vectors are as long as SSE4's, and the code is the same.
 VotingKernel fastestOf(const std::vector<VotingKernel>& kernels);

@@ -75,7 +75,7 @@ void FusionAccumulator::add(const PlaneValues& values) {
   if (first) added_ = 0;
   ++added_;
   if (inputs_ <= 2) {
-    // One input is its own mean, and two have a mean without a sum in between.
+    // One input is its own mean. The mean of two inputs needs no sum.
     if (!first) {
       steps_->pair(mean_.data(), values.data(), mean_.size());
     } else if (&values != &mean_) {
@@ -99,7 +99,7 @@ bool camerasFirst(const FusionOptions& options) {
   return options.order == FusionOrder::kCamerasThenTime;
 }
 
-/// All inputs: the axis that is fused first varies fastest.
+/// Returns all inputs. The axis that is fused first varies fastest.
 std::vector<CameraSlot> inputsInOrder(const FusionInputs& inputs, bool cameras_first) {
   std::vector<CameraSlot> all;
   for (int group = 0; group < inputs.groups; ++group) {

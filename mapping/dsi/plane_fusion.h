@@ -13,37 +13,37 @@ namespace kernels {
 struct FusionSteps;
 }  // namespace kernels
 
-/// How the ray densities of several DSIs become one, voxel by voxel (Ghosh and Gallego 2022,
-/// Eqs. 6-11): means of n inputs with equal weights, symmetric, and ordered
-/// min <= harmonic <= geometric <= arithmetic <= rms <= max.
+/// The mean that fuses the ray densities of several DSIs, voxel by voxel (Ghosh and Gallego 2022,
+/// Eqs. 6-11). All means are symmetric, give n inputs equal weights, and are ordered: min <=
+/// harmonic <= geometric <= arithmetic <= rms <= max.
 enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
 
-/// "min", "harmonic", "geometric", "arithmetic", "rms", "max".
+/// Returns "min", "harmonic", "geometric", "arithmetic", "rms" or "max".
 std::string_view nameOf(FusionRule rule);
 FusionRule fusionRuleFromName(std::string_view name);
-/// Whether zero in any input makes the mean zero.
+/// Returns whether the mean is zero if any input is zero.
 bool isAndLike(FusionRule rule);
-/// All rules, in their order.
+/// Returns all rules, in the order of the enum.
 const std::vector<FusionRule>& allFusionRules();
-/// The rule's arithmetic.
+/// Returns the rule's arithmetic.
 const kernels::FusionSteps& stepsOf(FusionRule rule);
 
-/// The mean of planes under one rule. Inputs are added one by one, so that one plane of memory
-/// serves any number of them. Inputs are ray densities, not negative. One input is its own mean,
-/// bit for bit.
+/// The mean of planes by one rule. Inputs are added one by one, so that one plane of memory is
+/// enough for any number of inputs. Inputs are ray densities, never negative. The mean of a single
+/// input has the same bits as the input.
 class FusionAccumulator {
  public:
-  /// @param inputs of each mean; at least 1.
+  /// @param inputs the number of inputs of each mean, at least 1.
   FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels);
 
-  /// A plane for the next input. It saves a copy where that input becomes the mean's first value.
+  /// Returns a plane for the next input. A first input that is written to it needs no copy.
   PlaneValues& next();
-  /// Adds an input. The first one after a complete mean begins the next mean.
+  /// Adds an input. The first input after a complete mean begins the next mean.
   /// @param values a plane of voxels, or `next()`.
   void add(const PlaneValues& values);
-  /// Whether all inputs of the mean are added.
+  /// Returns whether all inputs of the mean are added.
   bool isComplete() const { return added_ == inputs_; }
-  /// The complete mean.
+  /// Returns the complete mean.
   const PlaneValues& mean() const { return mean_; }
 
  private:
@@ -56,17 +56,17 @@ class FusionAccumulator {
   PlaneValues next_;
 };
 
-/// Which axis is fused first. The paper writes S_t∘S_c for cameras first, S_c∘S_t for time first.
+/// The axis that is fused first. The paper has S_t∘S_c for cameras first, S_c∘S_t for time first.
 enum class FusionOrder { kCamerasThenTime, kTimeThenCameras };
 
-/// "cameras_then_time", "time_then_cameras".
+/// Returns "cameras_then_time" or "time_then_cameras".
 std::string_view nameOf(FusionOrder order);
 FusionOrder fusionOrderFromName(std::string_view name);
 
-/// How the DSIs of several cameras and sub-intervals become one (Ghosh and Gallego 2022, Sec. 3.4
+/// The fusion of the DSIs of several cameras and sub-intervals (Ghosh and Gallego 2022, Sec. 3.4
 /// and 3.5): any rule on either axis, in either order. Algorithm 1 is harmonic across cameras with
-/// one sub-interval, and the same as harmonic across cameras after arithmetic across time;
-/// Algorithm 2 is arithmetic across time after harmonic across cameras, the default.
+/// one sub-interval; arithmetic across time, then harmonic across cameras, gives the same result.
+/// Algorithm 2, the default, is harmonic across cameras, then arithmetic across time.
 struct FusionOptions {
   FusionRule across_cameras = FusionRule::kHarmonic;
   FusionRule across_time = FusionRule::kArithmetic;
@@ -83,8 +83,8 @@ struct FusionOptions {
 /// The numbers of inputs of a plane.
 struct FusionInputs {
   int cameras = 1;          ///< Number of cameras, at least 1.
-  int slots_per_group = 1;  ///< Slots of each camera; at least 1.
-  int groups = 1;           ///< Each is fused by itself; the fused groups are summed. At least 1.
+  int slots_per_group = 1;  ///< Number of slots of each camera in a group, at least 1.
+  int groups = 1;           ///< Number of groups, at least 1: fused alone, then summed.
 };
 
 /// One input of a plane: a camera in a slot of the time axis. The slots of group g begin at
@@ -94,33 +94,33 @@ struct CameraSlot {
   int slot = 0;
 };
 
-/// Fuses one plane of the DSIs of all cameras, sub-intervals and groups. Holds two planes for each
-/// axis and one for the sum of groups, for any number of inputs. An axis with one input is left
-/// out, bit for bit.
+/// Fuses one plane of the DSIs of all cameras, sub-intervals and groups. Its memory is two planes
+/// per axis and one for the sum of groups, for any number of inputs. An axis with one input changes
+/// no bit.
 ///
-/// Use: `begin`; then, for each of `inputs`, write it to `next` and `add` it; then `fused`.
+/// Use: `begin`; then write each input of `inputs` to `next` and `add` it; then `fused`.
 class PlaneFusion {
  public:
-  /// Which planes are fused.
+  /// The planes that are fused.
   enum class Keep {
     kFusedOnly,
     kCameras,  ///< Fuses also each camera alone, across time: a plane of memory per camera.
   };
 
-  /// @param voxels of a plane or of a tile of it.
+  /// @param voxels the number of voxels of a plane, or of a tile of a plane.
   PlaneFusion(const FusionOptions& options, const FusionInputs& inputs, std::size_t voxels,
               Keep keep = Keep::kFusedOnly);
 
-  /// All inputs, in the order in which they are added.
+  /// Returns all inputs, in the order in which they are added.
   const std::vector<CameraSlot>& inputs() const { return inputs_; }
   /// Begins a plane.
   void begin();
-  /// The buffer for the ray density of the next input.
+  /// Returns the buffer for the ray density of the next input.
   PlaneValues& next() { return inner_.next(); }
   void add(const CameraSlot& input);
-  /// The fused plane, after the last input.
+  /// Returns the fused plane, after the last input.
   const PlaneValues& fused() const { return groups_ == 1 ? groupMean().mean() : sum_; }
-  /// A camera's own plane, where cameras are kept.
+  /// Returns a camera's own plane. Needs `Keep::kCameras`.
   const PlaneValues& ofCamera(int camera) const {
     const auto c = static_cast<std::size_t>(camera);
     return groups_ == 1 ? cameras_[c].mean() : camera_sums_[c];
@@ -134,8 +134,8 @@ class PlaneFusion {
   std::vector<CameraSlot> inputs_;
   FusionAccumulator inner_;
   FusionAccumulator outer_;
-  PlaneValues sum_;                         // of several groups
-  std::vector<FusionAccumulator> cameras_;  // where they are kept
+  PlaneValues sum_;                         // of the groups, if there are several
+  std::vector<FusionAccumulator> cameras_;  // for `Keep::kCameras`
   std::vector<PlaneValues> camera_sums_;
 };
 
