@@ -14,8 +14,8 @@ struct FusionSteps;
 }  // namespace kernels
 
 /// The mean that fuses the ray densities of several DSIs, voxel by voxel (Ghosh and Gallego 2022,
-/// Eqs. 6-11). All means are symmetric, give n inputs equal weights, and are ordered: min <=
-/// harmonic <= geometric <= arithmetic <= rms <= max.
+/// Eqs. 6-11). All means are symmetric, give n inputs equal weights, and are ordered:
+/// min <= harmonic <= geometric <= arithmetic <= rms <= max.
 enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
 
 /// Returns "min", "harmonic", "geometric", "arithmetic", "rms" or "max".

@@ -47,8 +47,8 @@ struct RayTransfer {
   float offset_y = 0;
 };
 
-/// Adds one bilinear vote to the plane for each ray whose four neighbouring pixels are inside it: 0
-/// <= x < width - 1 and 0 <= y < height - 1. This plain scalar kernel is the specification.
+/// Adds one bilinear vote to the plane for each ray whose four neighbouring pixels are inside it:
+/// 0 <= x < width - 1 and 0 <= y < height - 1. This plain scalar kernel is the specification.
 /// @return the number of votes cast.
 std::uint64_t voteBilinear(const RayArrays& rays, const RayTransfer& transfer,
                            const VotePlane& plane);

@@ -8,7 +8,7 @@
 
 namespace efm::kernels {
 
-// Votes on one tile of one depth plane, small enough to stay in the first-level cache.
+// Votes on one tile of one depth plane. A tile is small enough to stay in the first-level cache.
 //
 // A vote falls into the cell between four pixels: cell (x, y) is the square from pixel (x, y) to
 // (x + 1, y + 1). A cell sums the weights of its votes for each of these pixels, in units of

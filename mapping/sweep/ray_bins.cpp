@@ -11,23 +11,23 @@
 namespace efm {
 namespace {
 
-/// Side of a bin, and the distance that packets of one `RayBins` may be apart. Smaller bins are
-/// more, larger bins have more rays that a tile does not see.
+/// Side of a bin, and largest distance between packets of one `RayBins`. Smaller bins are more
+/// numerous, larger bins have more rays that a tile does not see.
 constexpr double kBin_px = 16;
-/// Average number of rays of a bin. Fewer rays do not fill vectors.
+/// Average number of rays per bin. Fewer rays do not fill a vector.
 constexpr double kRaysPerBin = 8;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A packet's transfer to one end of the planes.
+/// Returns a packet's transfer to a plane: the scale and the shift (px) of the principal point.
 Eigen::Array3d transferAt(const RayPacket& packet, const ReferenceView& view,
                           double inverse_depth) {
   const PlaneTransfer to = transferToPlane(packet, view, 1 / inverse_depth);
   return {to.scale, to.offset_x + (to.scale - 1) * view.cx, to.offset_y + (to.scale - 1) * view.cy};
 }
 
-/// How far apart packets move the same ray, over the planes. Rays lie up to half a view from the
-/// principal point.
+/// The largest distance between pixels that packets give to the same ray, over the planes. Rays are
+/// up to half a view from the principal point.
 class Spread {
  public:
   explicit Spread(const ReferenceView& view) : view_(view) {}
@@ -63,7 +63,7 @@ PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid) {
   const auto in_front = [&](int plane) {
     return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
   };
-  // Forward rays leave their camera for the farther planes, backward rays for the nearer ones.
+  // Forward rays run from their camera to farther planes, backward rays to nearer planes.
   int begin = 0;
   int end = count;
   while (begin < end) {
@@ -83,7 +83,7 @@ RayBins::Axis::Axis(const Range& pixels, float side) : begin(pixels.min), bins_p
 }
 
 RayBins::Directions::Directions(const RayBundle& rays) {
-  // A sample: rays beyond its range are in the outermost bins.
+  // The range of a sample of rays: rays beyond it are in the outermost bins.
   constexpr std::size_t kStep = 16;
   const auto rangeOf = [](const std::vector<float>& values) {
     Range range;
@@ -155,8 +155,8 @@ RayBins::Transfer RayBins::toOther(const RayPacket& packet, Eigen::Index axis,
   return {scale, principal + other[axis] - scale * (principal + anchor[axis])};
 }
 
-/// Bins over the pixels on the anchor plane of all rays that are inside the view on some plane: at
-/// one of the two ends they are farthest from it.
+/// Returns bins for the anchor-plane pixels of all rays that are inside the view on some plane. A
+/// ray is farthest from the view at one of the two ends of the planes.
 RayBins::Axis RayBins::axisOf(Eigen::Index axis, int pixels, double principal,
                               const Range& at_infinity, std::size_t rays) const {
   double in_view_min = 0;
@@ -178,15 +178,15 @@ RayBins::Axis RayBins::axisOf(Eigen::Index axis, int pixels, double principal,
   }
   const Range range{static_cast<float>(std::max(min, in_view_min)),
                     static_cast<float>(std::min(max, in_view_max))};
-  // The number of bins along either axis is the number that the rays fill on average.
+  // Number of bins along each axis, so that a bin has kRaysPerBin rays on average.
   const double bins = std::max(1.0, std::sqrt(static_cast<double>(rays) / kRaysPerBin));
   const double width = std::max(double{range.max - range.min}, 1.0);
   const double side = std::max(kBin_px / widening, width / bins);
   return {range, static_cast<float>(side)};
 }
 
-/// Visits the rays that cross the view: visit(ray, column, row, x, y), with the bin and the pixel
-/// at the other end of the planes.
+/// Visits the rays that cross the view: visit(ray, column, row, x, y). (column, row) is the bin,
+/// (x, y) the pixel at the other end of the planes.
 template <typename Visit>
 void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
   struct ToPlane {
@@ -248,7 +248,7 @@ void RayBins::store(const RayBundle& bundle) {
     rays_[next[row * columns + column]++] = ray;
   });
   packets_ = {};
-  constexpr double kMaxDistance_px = 8192;  // floats have 1/2048 px there
+  constexpr double kMaxDistance_px = 8192;  // floats have a resolution of 1/2048 px there
   moving_ = double{max_shift} * std::abs(to_pixels_) <= kMaxDistance_px;
 }
 
@@ -260,8 +260,8 @@ RayBins::Footprint RayBins::footprintOn(const PlaneRange& planes) const {
   return footprint;
 }
 
-/// Rays run straight: on a plane between the two ends, pixels are weighted means of the pixels
-/// there.
+/// Rays are straight: on a plane between the two ends, pixels are weighted means of the pixels at
+/// both ends.
 RayBins::Footprint::Side RayBins::sideOf(const Axis& axis, const PlaneRange& planes) const {
   const auto pixelsOn = [&](std::size_t bin, double inverse_depth) {
     const Range& anchor = axis.on_anchor[bin];

@@ -18,9 +18,9 @@ namespace efm {
 /// Consecutive depth planes.
 struct PlaneRange {
   int begin = 0;
-  int end = 0;       ///< One past the last.
+  int end = 0;       ///< One past the last plane.
   double first = 0;  ///< Inverse depth of plane `begin`, 1/m.
-  double last = 0;   ///< Inverse depth of plane `end - 1`.
+  double last = 0;   ///< Inverse depth of plane `end - 1`, 1/m.
 
   PlaneRange() = default;
   PlaneRange(const DepthPlanes& planes, int begin_plane, int end_plane)
@@ -30,27 +30,27 @@ struct PlaneRange {
         last(1 / planes.depth(end_plane - 1)) {}
 };
 
-/// The planes in front of a packet's camera, along its rays; empty where all are behind it.
+/// Returns the planes in front of a packet's camera, along its rays; empty if all are behind it.
 PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid);
 
 /// Rays of consecutive packets that are in front of their cameras on the same planes, and whose
-/// cameras are close together. They are sorted into square bins by their pixel on one plane, the
-/// anchor plane (Z0 of Rebecq et al., IJCV 2018, Eq. 15): a tile's rays on any plane are in a few
-/// adjacent bins. Within a bin, rays keep the order of time.
+/// cameras are close together. Rays are sorted into square bins by their pixel on the anchor plane
+/// (Z0 of Rebecq et al., IJCV 2018, Eq. 15): a tile's rays on any plane are in a few adjacent bins.
+/// Within a bin, rays are in order of time.
 ///
-/// A ray crosses the planes along a straight line. With u counted from the principal point, its
-/// pixel is linear in inverse depth: u(1/Z) = u_inf + (f C_x - C_z u_inf) / Z.
+/// A ray is straight, so that its pixel is linear in inverse depth, with the camera centre C in
+/// frame `ref` and u in pixels from the principal point: u(1/Z) = u_inf + (f C_x - C_z u_inf) / Z.
 class RayBins {
  public:
   /// Sorts the rays of one input. Rays outside the view on all planes in front of their camera are
-  /// left out. Runs on the threads of the task arena that it is called in.
+  /// dropped. Runs on the threads of the caller's task arena.
   static std::vector<RayBins> sort(const RayBundle& rays, const DsiGrid& grid);
 
-  /// The plane where moving rays have their pixels, 1/m: in the middle of all planes.
+  /// Returns the plane where moving rays have their pixels, 1/m: the middle of all planes.
   static double pixelPlane(const DepthPlanes& planes) {
     return 0.5 * (1 / planes.depth(0) + 1 / planes.depth(planes.size() - 1));
   }
-  /// Whether the rays are in front of their cameras on all planes of a group, and can move over it.
+  /// Returns whether the rays move, and are in front of their cameras on all planes of a group.
   bool covers(const PlaneRange& group) const {
     return moving_ && planes_.begin <= group.begin && planes_.end >= group.end;
   }
@@ -61,12 +61,12 @@ class RayBins {
    private:
     friend class RayBins;
 
-    /// The pixels of the bins along one axis, kept so that the bins that meet an interval are found
-    /// by search.
+    /// The pixels of the bins along one axis, ordered for a binary search of the bins that overlap
+    /// an interval.
     struct Side {
-      std::vector<float> max_until;  // of the bins up to this one
-      std::vector<float> min_from;   // of this bin and those after it
-      /// @return the first, and one past the last, of the bins that meet an interval.
+      std::vector<float> max_until;  // largest pixel of the bins up to this bin
+      std::vector<float> min_from;   // smallest pixel of this bin and all later bins
+      /// @return the first, and one past the last, of the bins that overlap an interval.
       std::pair<std::size_t, std::size_t> binsIn(float min, float max) const;
     };
 
@@ -74,11 +74,11 @@ class RayBins {
     Side columns_;
     Side rows_;
   };
-  /// @param planes in front of the rays' cameras.
+  /// @param planes planes in front of the rays' cameras.
   Footprint footprintOn(const PlaneRange& planes) const;
   /// Appends the rays that may fall into the tile's cells on planes of the footprint. Thread-safe.
-  /// Rays so oblique that floats could not tell where they are from one plane on another stand
-  /// still: they need a footprint on a single plane.
+  /// If rays are too oblique for the precision of floats, they do not move from plane to plane:
+  /// they need a footprint on a single plane.
   void gather(const Footprint& footprint, const TileCells& tile,
               const kernels::TileFunctions& functions, TileRays& rays) const;
 
@@ -97,13 +97,13 @@ class RayBins {
     Axis(const Range& pixels, float side);
 
     std::size_t bins() const { return on_anchor.size(); }
-    /// The bin of a pixel of the anchor plane.
+    /// Returns the bin of a pixel of the anchor plane.
     std::size_t binOf(float pixel) const {
       const float bin = (pixel - begin) * bins_per_pixel;
       return static_cast<std::size_t>(std::max(0.0F, std::min(bin, last_bin)));
     }
 
-    float begin = 0;  // of the first bin, pixels of the anchor plane
+    float begin = 0;  // start of the first bin, pixels of the anchor plane
     float bins_per_pixel = 1;
     float last_bin = 0;
     // The pixels of each bin's rays on the anchor plane, and on the plane at the other end.
@@ -115,7 +115,7 @@ class RayBins {
     double scale, offset;
   };
 
-  /// The pixels of a bundle's rays on the plane at infinity.
+  /// The ranges of a bundle's pixels on the plane at infinity.
   struct Directions {
     explicit Directions(const RayBundle& rays);
     Range x, y;
@@ -135,49 +135,49 @@ class RayBins {
   bool moving_ = true;
   std::vector<RayPacket> packets_;
   ReferenceView view_;
-  double anchor_ =
-      0;  // inverse depth: of the two ends of the planes, where rays are closer together
-  double other_ = 0;      // of the other end
+  // Inverse depths, 1/m. The anchor is the end of the planes where rays are closer together.
+  double anchor_ = 0;
+  double other_ = 0;      // the other end of the planes
   double to_pixels_ = 0;  // from the anchor to the plane of pixels
   Axis columns_;
   Axis rows_;
-  std::vector<std::uint32_t> begin_;  // of each bin's rays, row by row, and the end of all
+  std::vector<std::uint32_t> begin_;  // start of each bin's rays, row by row, and the last end
   std::vector<kernels::BinnedRay> rays_;
 };
 
-/// The rays of all inputs in bins, where a tile finds its rays for a group of planes. An input is
+/// The rays of all inputs in bins: there a tile finds its rays for a group of planes. An input is
 /// one slot of one camera (`CameraRays`): the rays of one group of events in one sub-interval.
 class RayIndex {
  public:
-  /// @param cameras consumed: each bundle is freed when it lies in bins.
+  /// @param cameras consumed: each bundle is freed when its rays are in bins.
   /// @param kernel one of `availableKernels`, but not the plain one.
   RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingKernel kernel);
 
-  /// Groups of planes in which rays do not move far, from the nearest plane to the farthest.
+  /// Returns groups of planes, from near to far. Within a group, rays do not move far.
   const std::vector<PlaneRange>& groups() const { return groups_; }
 
-  /// Input (camera, slot) has the index camera * slots + slot, with the slots of all groups of
-  /// events.
+  /// Returns the number of inputs. Input (camera, slot) has the index camera * slots + slot, where
+  /// `slots` counts all groups.
   std::size_t inputs() const { return inputs_.size(); }
-  /// Replaces `rays` by those of an input that the tile may see in a group: rays in front of their
-  /// cameras on all planes of the group. Thread-safe.
+  /// Replaces `rays` by the rays of an input that the tile may see in a group of planes. They are
+  /// in front of their cameras on all planes of the group. Thread-safe.
   void gather(std::size_t group, std::size_t input, const TileCells& tile, TileRays& rays) const;
-  /// Adds the other rays that are in front of their cameras on a plane of the group, in place of
-  /// those of another plane. Thread-safe.
+  /// Adds the other rays that are in front of their cameras on a plane of the group. Rays that the
+  /// last `gatherOn` added are removed first. Thread-safe.
   void gatherOn(int plane, std::size_t group, std::size_t input, const TileCells& tile,
                 TileRays& rays) const;
-  /// Distance from the plane where moving rays have their pixels to a plane, 1/m.
+  /// Returns the distance from the plane where moving rays have their pixels to a plane, 1/m.
   double fromPixels(int plane) const {
     return 1 / planes_.depth(plane) - RayBins::pixelPlane(planes_);
   }
 
-  /// Frees the rays; the counts stay.
+  /// Frees the rays, but not the counts.
   void release() { inputs_ = {}; }
-  /// Per camera: the counts if no vote is cast.
+  /// Returns the counts of each camera as if no vote were cast.
   const std::vector<VoteCounts>& notCast() const { return not_cast_; }
 
  private:
-  /// Bins and where they are on some planes.
+  /// The index of bins, and their footprint on some planes.
   struct Source {
     std::size_t bins = 0;
     RayBins::Footprint footprint;
@@ -185,7 +185,7 @@ class RayIndex {
   /// The bins that a group of planes needs.
   struct GroupSources {
     std::vector<Source> in_group;               // in front of their cameras on all planes
-    std::vector<std::vector<Source>> on_plane;  // the others, by plane of the group; or empty
+    std::vector<std::vector<Source>> on_plane;  // the other bins, by plane; or empty
   };
   struct Input {
     std::vector<RayBins> bins;

@@ -6,11 +6,11 @@
 namespace efm {
 namespace {
 
-/// Gathering a ray for a group of planes costs as much as this number of votes, with the rays
-/// around the tile that are looked at in vain.
+/// The cost of gathering a ray for a group of planes, in votes. It includes the rays around the
+/// tile that are tested but not used.
 constexpr double kGatheringVotes = 2.5;
 
-/// Votes on planes behind the camera.
+/// Returns the number of votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
   std::uint64_t behind = 0;
   for (const RayPacket& packet : rays.packets) {
@@ -21,13 +21,13 @@ std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
   return behind;
 }
 
-/// The mean shift of rays per unit of inverse depth, in pixels: of a ray halfway between the
-/// principal point and the border of the view, for each packet.
+/// The mean shift of rays, in pixels per 1/m of inverse depth. For each packet, it is the
+/// shift of a ray halfway between the principal point and the border of the view.
 class MeanShift {
  public:
   explicit MeanShift(const DsiGrid& grid) : view_(grid.view) {
     const double range = 1 / grid.planes.depth(0) - 1 / grid.planes.depth(grid.planes.size() - 1);
-    // A ray that crosses the view counts once, however fast it is.
+    // The limit is the size of the view: a fast ray crosses the view only once.
     max_shift_ = std::max(view_.width, view_.height) / std::max(range, 1e-12);
   }
 
@@ -72,10 +72,10 @@ RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingK
   }
 }
 
-/// Rays that move while they are in a group are gathered by more tiles, and vote outside them on
-/// some planes. With rays that move by s pixels from plane to plane, n planes in a group and tiles
-/// of t pixels, a vote costs 1 + n s / t + kGatheringVotes / n, which is least where n s is the
-/// root of kGatheringVotes t s.
+/// Rays that move within a group are gathered by more tiles, and vote outside these tiles on some
+/// planes. A vote costs 1 + n s / t + kGatheringVotes / n if rays move by s pixels per plane, a
+/// group has n planes and a tile has t pixels per side. The cost is lowest if
+/// n s = sqrt(kGatheringVotes t s).
 std::vector<PlaneRange> RayIndex::dividePlanes(double shift) const {
   const double range = 1 / planes_.depth(0) - 1 / planes_.depth(planes_.size() - 1);
   const double per_plane_px = shift * range / std::max(1, planes_.size() - 1);

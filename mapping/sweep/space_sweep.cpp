@@ -41,7 +41,7 @@ void SpaceSweepOptions::validate() const {
 }
 
 int SpaceSweepOptions::threadsOrCores() const {
-  // The host of this process limits the number of threads, also a requested one.
+  // The host of this process limits the number of threads, also a requested number.
   const auto allowed = static_cast<int>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   return std::max(1, std::min(threads.value_or(allowed), allowed));
@@ -89,7 +89,7 @@ VoteCounts votePlane(const RayBundle& rays, const ReferenceView& view, double de
   return counts;
 }
 
-/// One plane at a time, on one thread.
+/// The buffers of one thread, which sweeps one plane at a time.
 struct PlaneScratch {
   PlaneFusion fusion;
   std::vector<VoteCounts> votes;  // per camera, of all planes so far
@@ -160,7 +160,7 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& g
 
 namespace {
 
-/// The first pixels of the parts of a side, and its end.
+/// Returns the first pixel of each part of a side, and the end of the side.
 std::vector<int> cut(int side, int max_pixels) {
   const int parts = (side + max_pixels - 1) / max_pixels;
   std::vector<int> cuts;
@@ -175,7 +175,7 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
-  std::vector<TilePeaks> cameras;  // where asked for
+  std::vector<TilePeaks> cameras;  // empty if not requested
 };
 
 /// The whole DSI for a sink.
@@ -219,7 +219,7 @@ class TiledSweep {
     }
   }
 
-  /// On the threads of the task arena that it is called in.
+  /// Sweeps all tiles on the threads of the caller's task arena.
   SweepResult run() {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, tiles_.size()),
@@ -244,7 +244,7 @@ class TiledSweep {
             std::vector<TilePeaks>(cameras_.size(), peaks)};
   }
 
-  /// All planes on one tile.
+  /// Sweeps all planes on one tile.
   void sweepTile(std::size_t t, Scratch& scratch) {
     const TileCells tile(tiles_[t], grid_.view);
     scratch.fusion.moveTo(tile);
@@ -297,7 +297,7 @@ class TiledSweep {
   RayIndex rays_;
   WholePlanes whole_planes_;
   ViewPeaks fused_;
-  std::vector<ViewPeaks> cameras_;  // where asked for
+  std::vector<ViewPeaks> cameras_;  // empty if not requested
   tbb::enumerable_thread_specific<Scratch> scratches_{[this] { return newScratch(); }};
 };
 

@@ -17,9 +17,9 @@ namespace efm {
 struct SpaceSweepOptions {
   FusionOptions fusion;
 
-  // Performance only. The number of threads never changes the result; kernels agree up to rounding.
-  std::optional<int> threads;          ///< 1 to 1024; the number of cores where not given.
-  std::optional<VotingKernel> kernel;  ///< An available one; the fastest of them where not given.
+  // For speed only. The number of threads never changes the result; kernels agree up to rounding.
+  std::optional<int> threads;          ///< 1 to 1024; default: the number of cores.
+  std::optional<VotingKernel> kernel;  ///< One of `availableKernels`; default: the fastest.
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -27,7 +27,7 @@ struct SpaceSweepOptions {
     visit("kernel", self.kernel);
   }
   void validate() const;
-  /// The number of threads that will run: never more than there are cores.
+  /// Returns the number of threads that will run, at most the number of cores.
   int threadsOrCores() const;
   VotingKernel kernelOrFastest() const;
 };
@@ -41,37 +41,37 @@ class DsiSink {
 };
 
 struct SweepRequest {
-  bool camera_peaks = false;  ///< Find also the peaks of each camera alone, fused across time.
-  DsiSink* sink = nullptr;    ///< Receives the whole fused DSI where given; not owned.
-  /// The groups of each camera's slots, one after the other: each group is fused by itself, and the
-  /// fused groups are summed. Divides the number of slots.
+  bool camera_peaks = false;  ///< True to find also each camera's own peaks, fused across time.
+  DsiSink* sink = nullptr;    ///< Receives the whole fused DSI if not null; not owned.
+  /// Number of consecutive groups of each camera's slots, a divisor of the number of slots. Each
+  /// group is fused alone, and the fused groups are summed.
   int groups = 1;
-  /// Return also the columns of the pixels whose confidence is above its mean in a Gaussian window
-  /// of this side: odd, at least 3. The peaks then have the confidence alone. 0: no columns.
+  /// Side of a Gaussian window in pixels: odd, at least 3; or 0 for no columns. Pixels get a column
+  /// if their confidence is above its mean in the window. Peaks then have only the confidence.
   int column_window = 0;
 };
 
-/// @param groups of slots that are fused separately; the number of slots is a multiple (asserted).
+/// @param groups a divisor of the number of slots (asserted).
 FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups);
 
 struct SweepResult {
   SweptDsi fused;
-  std::vector<SweptDsi> cameras;  ///< Each alone, where asked for.
+  std::vector<SweptDsi> cameras;  ///< Each camera's own DSI, if requested.
   std::vector<VoteCounts> votes;  ///< Per camera.
 };
 
 /// Sweeps the depth planes through space (Ghosh and Gallego 2022, Algorithm 2, lines 3 and 4): on
 /// each plane it votes for every camera and sub-interval, fuses the votes, and updates the peak of
-/// every pixel. It stores no volume. Memory besides the rays is O(width * height), for any number
-/// of planes and sub-intervals; `camera_peaks` multiply it by the cameras, the plain kernel by the
-/// threads. Columns add a byte per plane of a selected pixel, a sink adds four per voxel. The
-/// order of planes and threads never changes the result.
+/// every pixel. It stores no volume. Besides the rays, memory is O(width * height) for any number
+/// of planes and sub-intervals; `camera_peaks` multiplies it by the number of cameras, the plain
+/// kernel by the number of threads. Columns add one byte per plane and selected pixel, a sink adds
+/// four bytes per voxel. The order of planes and threads never changes the result.
 /// @param cameras the rays of each camera that is fused, at least one; consumed.
 SweepResult sweepSpace(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options = {}, const SweepRequest& request = {});
 
-/// The sweep with the plain kernel, the specification: whole planes, one per thread at a time.
-/// Memory: O(threads * width * height), for any number of planes, cameras and sub-intervals.
+/// Sweeps with the plain kernel, the specification: whole planes, one per thread at a time. Memory:
+/// O(threads * width * height), for any number of planes, cameras and sub-intervals.
 SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& grid,
                         const SpaceSweepOptions& options, const SweepRequest& request);
 
@@ -79,15 +79,15 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& g
 /// row, without gap or overlap.
 std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels);
 
-/// The sweep with the fast kernels, tile by tile. A tile is a small rectangle of the view: its
-/// votes on one plane, their fusion and the running peaks stay in the first two levels of cache,
-/// and no plane exists as a whole. Planes come in groups; a tile gathers its rays once per group.
-/// Memory besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
+/// Sweeps with the fast kernels, tile by tile. A tile is a small rectangle of the view. Its votes
+/// on one plane, their fusion and the running peaks stay in the first two levels of cache, and no
+/// whole plane is stored. Planes are in groups; a tile gathers its rays once per group. Memory
+/// besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
 /// threads.
 ///
-/// Tiles share nothing, and a tile's votes have an order: the result has the same bits for any
+/// Tiles share no data, and a tile's votes have a fixed order: the result has the same bits for any
 /// number of threads.
-/// @param cameras consumed: each bundle is freed when it is sorted into bins.
+/// @param cameras consumed: each bundle is freed when its rays are in bins.
 SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options, const SweepRequest& request);
 

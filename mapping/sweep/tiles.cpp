@@ -15,7 +15,7 @@ int roundDown(int value, int unit) { return value / unit * unit; }
 
 TileCells::TileCells(const cv::Rect& tile_pixels, const ReferenceView& view) : tile(tile_pixels) {
   assert(tile.width <= kMaxPixels && tile.height <= kMaxPixels);
-  // A pixel has cells on its left and above it; the view has none beyond its last pixels.
+  // A pixel has cells on its left and above it; the view has no cells beyond its last pixels.
   all = {tile.x - 1, tile.y - 1, tile.width + 1, tile.height + 1};
   in_view = all & cv::Rect(0, 0, view.width - 1, view.height - 1);
   if (in_view.empty()) in_view = {};
@@ -46,8 +46,8 @@ constexpr int kStride = kernels::kTileCells;
 TileAccumulator::TileAccumulator(VotingKernel kernel)
     : scatter_(kernels::tileFunctions(kernel)),
       resolve_(kernels::resolveFunctions(kernel)),
-      // Vectors read past the last row. A ray outside the view adds zero to a cell up to a tile
-      // from the first cell inside.
+      // Vectors read past the last row. A ray outside the view adds zero to a cell at most one tile
+      // after the first cell inside.
       cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0),
       dirty_(kernels::kLines, 0) {}
 
@@ -84,14 +84,14 @@ std::uint64_t TileAccumulator::resolve(float* density) {
   return units + addFullCells(density);
 }
 
-/// Adds the weights of full cells. @return those of pixels in the tile, in units.
+/// Adds the weights of full cells. @return the weights of pixels in the tile, in units.
 std::uint64_t TileAccumulator::addFullCells(float* density) const {
   constexpr float kUnit = 1.0F / (1 << kernels::kWeightBits);
   const cv::Rect& tile = tile_.tile;
   std::uint64_t units = 0;
   for (std::size_t i = 0; i < full_cells_; ++i) {
     const kernels::CellSums sums = kernels::unpack(full_[i].sums);
-    // Cell of the pixel to the lower right.
+    // Position in the tile of the cell's lower right pixel.
     const int x = static_cast<int>(full_[i].index) % kStride;
     const int y = static_cast<int>(full_[i].index) / kStride;
     const auto add = [&](int column, int row, std::uint32_t weight) {
@@ -132,8 +132,8 @@ int TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumu
 
 namespace {
 
-/// Marks of lines with votes pay where few lines have them: with at most this number of rays per
-/// pixel in one of two inputs, as long as this fraction of pixels at most is not skipped.
+/// Marks of lines are faster if few lines have votes: if one of two inputs has at most this number
+/// of rays per pixel, and if at most this fraction of pixels is not skipped.
 constexpr double kMaxMarkedRays = 1;
 constexpr double kMaxMarkedPixels = 0.5;
 

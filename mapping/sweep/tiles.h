@@ -20,34 +20,34 @@
 namespace efm {
 
 /// The cells that the pixels of a tile get votes from. A cell lies between four pixels and has the
-/// coordinates of its upper left one.
+/// coordinates of its upper left pixel.
 struct TileCells {
-  /// Pixels on a side of a tile at most.
+  /// Maximum number of pixels per side of a tile.
   static constexpr int kMaxPixels = kernels::kTileCells - 1;
 
   TileCells() = default;
   TileCells(const cv::Rect& tile, const ReferenceView& view);
 
   cv::Rect tile;     ///< Pixels.
-  cv::Rect all;      ///< All cells, also outside the view: a pixel at its border has such cells.
-  cv::Rect in_view;  ///< Those of `all` that are inside the view.
+  cv::Rect all;      ///< All cells; a tile at the view's border has cells outside the view.
+  cv::Rect in_view;  ///< The cells of `all` that are inside the view.
   cv::Point origin;  ///< Origin of the coordinates of the tile's rays, pixels.
 };
 
-/// The rays that one tile sees of one input: those of a group of planes, and after them those of
-/// one plane alone. Keeps its memory.
+/// The rays of one input that one tile sees: first the rays of a group of planes, then the rays of
+/// one plane alone. Memory is reused.
 class TileRays {
  public:
   void clear() { size_ = 0; }
-  /// The rays so far are those of the group.
+  /// Marks the rays so far as the rays of the group.
   void keep() { kept_ = size_; }
   /// Removes the rays of one plane alone.
   void clearToKept() { size_ = kept_; }
   std::size_t size() const { return size_; }
 
-  /// Makes room for more rays, which a kernel may write after the existing ones.
+  /// Allocates memory for more rays, which a kernel may write after the existing rays.
   void reserve(std::size_t more);
-  /// Sets the number of rays after a kernel wrote some.
+  /// Sets the number of rays after a kernel wrote rays.
   void resize(std::size_t size) { size_ = size; }
   /// Fills up the last vector with rays that no tile sees.
   void pad();
@@ -69,24 +69,24 @@ class TileAccumulator {
   /// @param kernel one of `availableKernels`, but not the plain one.
   explicit TileAccumulator(VotingKernel kernel);
 
-  /// Moves to a tile. No votes are pending (asserted).
+  /// Moves to a tile. No votes may be pending (asserted).
   void moveTo(const TileCells& tile);
 
   /// Votes with the tile's rays on one plane.
-  /// @param rays padded. @param from_pixels from the plane of the rays' pixels to this one, 1/m.
-  /// @param marks whether lines of cells with votes are marked, for `addPair`: it pays where few
-  /// cells have votes. Both inputs must be alike.
+  /// @param rays padded. @param from_pixels from the plane of the rays' pixels to this plane, 1/m.
+  /// @param marks true to mark lines of cells with votes, for `addPair`: it is faster if few cells
+  /// have votes. Both inputs of `addPair` need the same value.
   void vote(TileRays& rays, double from_pixels, bool marks = false);
-  /// Resolves all pixels; no vote is left.
+  /// Resolves all pixels. No votes are pending afterwards.
   /// @param density one value per pixel of the tile, row-major.
   /// @return the sum of all pixels' weights, in units. All tiles together have
   /// 2^kernels::kWeightBits units for each vote in the view.
   std::uint64_t resolve(float* density);
 
-  /// Adds the mean of two inputs on the same tile to a sum; no vote is left. The bits are those of
-  /// `resolve` and the rule's mean.
-  /// @param rule AND-like. @param sum as `density`, and kernels::kSumPadding. @param units receives
-  /// those of each input, added. @return the number of pixels that were not skipped.
+  /// Adds the mean of two inputs on the same tile to a sum, with the bits of `resolve` and the
+  /// rule's mean. No votes are pending afterwards. @return the number of pixels not skipped.
+  /// @param rule an AND-like rule. @param sum as `density`, with kernels::kSumPadding.
+  /// @param units the sum of weights of each input, in units, is added to it.
   static int addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,
                      std::uint64_t units[2]);
 
@@ -100,16 +100,16 @@ class TileAccumulator {
   PixelValues<std::uint8_t> dirty_;
   std::vector<kernels::FullCell> full_;
   std::size_t full_cells_ = 0;
-  PlaneValues density_;   // of a pair with full cells
-  bool pending_ = false;  // votes that are not resolved
-  bool marked_ = false;   // whether they are marked
+  PlaneValues density_;   // for a pair with full cells
+  bool pending_ = false;  // true if votes are not resolved
+  bool marked_ = false;   // true if their lines are marked
   TileCells tile_;
 };
 
 /// Votes and fuses all inputs of one tile, plane by plane.
 ///
-/// Two cameras under an AND-like rule, whose slots are summed, have a shortcut with the same bits:
-/// their cells are resolved and fused at once.
+/// There is a shortcut for two cameras with an AND-like rule and summed slots: their cells are
+/// resolved and fused in one step, with the same bits.
 class TileFusion {
  public:
   /// @param kernel one of `availableKernels`, but not the plain one.
@@ -117,13 +117,13 @@ class TileFusion {
              VotingKernel kernel);
 
   void moveTo(const TileCells& tile);
-  /// The fused plane, until the next call.
-  /// @param rays the tile's, padded: input (camera, slot) at camera * slots * groups + slot.
-  /// @param from_pixels from the plane of the rays' pixels to this one, 1/m.
+  /// Returns the fused plane, valid until the next call.
+  /// @param rays padded: input (camera, slot) is at camera * slots_per_group * groups + slot.
+  /// @param from_pixels from the plane of the rays' pixels to this plane, 1/m.
   const PlaneValues& fuse(std::vector<TileRays>& rays, double from_pixels);
-  /// A camera's own plane after `fuse`, where cameras are kept.
+  /// Returns a camera's own plane after `fuse`. Needs `PlaneFusion::Keep::kCameras`.
   const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
-  /// The weights of each camera's votes on all tiles and planes so far, in units.
+  /// Returns the weights of each camera's votes on all tiles and planes so far, in units.
   const std::vector<std::uint64_t>& units() const { return units_; }
 
  private:
@@ -132,17 +132,17 @@ class TileFusion {
   FusionOptions options_;
   FusionInputs inputs_;
   PlaneFusion::Keep keep_;
-  bool pairs_;  // whether the shortcut applies
-  // The second one serves the shortcut.
+  bool pairs_;  // true if the shortcut applies
+  // The second accumulator is for the shortcut.
   std::array<TileAccumulator, 2> accumulators_;
   std::optional<PlaneFusion> planes_;
-  PlaneValues sum_, group_sum_;  // of the shortcut
-  std::vector<bool> skips_;      // by slot: whether marks made it skip many pixels of this tile
+  PlaneValues sum_, group_sum_;  // for the shortcut
+  std::vector<bool> skips_;      // by slot: true if marks made it skip many pixels of this tile
   std::vector<std::uint64_t> units_;
 };
 
-/// The peaks and columns of one DSI on all tiles: the fused one, or one camera's. With columns, of
-/// the peaks the confidence alone.
+/// The peaks and columns of one DSI on all tiles: the fused DSI, or one camera's. If there are
+/// columns, the peaks have only the confidence.
 class ViewPeaks {
  public:
   ViewPeaks(const DsiGrid& grid, int column_window, std::size_t tiles)
@@ -151,7 +151,7 @@ class ViewPeaks {
         peaks_(unwrittenPeaks(grid.view, column_window > 0)),
         columns_(tiles) {}
 
-  /// The whole view, when every tile is written. Its columns are moved out.
+  /// Returns the whole view after every tile is written. Its columns are moved out.
   SweptDsi sweptDsi() {
     if (column_window_ == 0) return {peaks_, {}};
     return {peaks_, DsiColumns(peaks_.confidence.size(), planes_, std::move(columns_))};
@@ -169,7 +169,7 @@ class ViewPeaks {
 /// The peaks and columns of one DSI on one tile at a time.
 class TilePeaks {
  public:
-  /// @param max_pixels of a tile.
+  /// @param max_pixels the largest number of pixels of a tile.
   TilePeaks(int planes, int column_window, std::size_t max_pixels)
       : volume_(column_window > 0 ? planes : 0, column_window > 0 ? max_pixels : 0) {}
 
@@ -177,7 +177,7 @@ class TilePeaks {
     tile_ = tile;
     peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
   }
-  /// Planes in increasing order, without a gap.
+  /// Adds a plane. Planes are added in increasing order, without a gap.
   void add(int plane, const PlaneValues& values) {
     peaks_->add(plane, values);
     if (!volume_.empty()) volume_.setPlane(plane, values);
