@@ -21,7 +21,7 @@ struct PeakFunctions;
 /// are stored (`DsiColumns`), only the confidence is filled: columns have the other values.
 struct DsiPeaks {
   cv::Mat1f confidence;  ///< The largest fused value; 0 if the pixel has no votes.
-  cv::Mat1i plane;       ///< The plane of this value; the nearest one if several are equal.
+  cv::Mat1i plane;       ///< The plane of `confidence`; the nearest if several are equal.
   cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
   cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
 };
@@ -72,8 +72,8 @@ class TileVolume {
 /// Columns of the fused DSI. A column has the values of one pixel on all planes. Only pixels that
 /// may become points have a column: their confidence is above that of their surroundings. In
 /// practice, such pixels are at most a third of a view. Only columns of the DSI are stored. A value
-/// takes one byte (`kernels::columnValue`): with 100 to 400 planes, points and errors are like
-/// those with two bytes. With many more planes, neighbouring planes have the same byte:
+/// takes one byte (`kernels::columnValue`): with 100 to 400 planes, points and errors are the
+/// same as with two bytes. With many more planes, neighbouring planes have the same byte:
 /// `aggregateColumns` then compares planes that are further apart.
 class DsiColumns {
  public:
