@@ -17,18 +17,18 @@ namespace efm::bench {
 struct SensorSize {
   int width = 0;
   int height = 0;
-  std::size_t events = 0;  ///< Per camera.
+  std::size_t events = 0;  ///< Events of one camera.
 
   std::string name() const { return std::to_string(width) + "x" + std::to_string(height); }
   SyntheticWindowOptions window(int cameras) const { return {width, height, events, cameras}; }
 };
 
-/// The smallest first.
+/// Sensors in order of size, the smallest first.
 using Sensors = std::vector<SensorSize>;
 
 inline constexpr int kPlanes = 100;
 
-/// The value of `make`, made at the first call: no benchmark may need it, because of a filter.
+/// Returns a function that calls `make` when first needed: a filter may exclude its benchmarks.
 template <typename Make>
 auto lazily(Make make) {
   using Value = std::invoke_result_t<Make>;
@@ -53,16 +53,16 @@ inline void countRate(benchmark::State& state, const char* name, double count) {
   state.counters[name] = benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Votes of one camera on one thread, per kernel and sensor, and the yardstick.
+/// Adds the votes of one camera on one thread, per kernel and sensor, and their reference.
 void addVoting(const Sensors& sensors);
-/// Whole keyframes: stages and memory, as shipped and with the paper's options for several motions
-/// and rigs, and over each of their sizes.
+/// Adds whole keyframes: their stages and memory, with the default and the paper's options for
+/// several motions and rigs, and their growth with each size.
 void addKeyframes(const Sensors& sensors);
-/// The six rules, the running peaks, and from peaks to a depth map.
+/// Adds the six fusion rules, the running peaks, and the depth extraction from peaks.
 void addFusion(const Sensors& sensors);
-/// Inserting a keyframe's cloud into small and large maps.
+/// Adds the insertion of a keyframe's cloud into small and large maps.
 void addGlobalCloud(const Sensors& sensors);
-/// Events from text, a rawlog and the files of sensors.
+/// Adds the reading of events from text, a rawlog and the file formats of sensors.
 void addReading(const Sensors& sensors);
 
 }  // namespace efm::bench

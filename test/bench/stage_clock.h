@@ -7,7 +7,7 @@
 
 namespace efm::bench {
 
-/// CPU time of all threads of this process since it began, in milliseconds.
+/// Returns the CPU time of all threads of this process since its start, in milliseconds.
 inline double processCpu_ms() {
   constexpr double kMsPerSecond = 1e3;
   constexpr double kMsPerNanosecond = 1e-6;
@@ -17,8 +17,8 @@ inline double processCpu_ms() {
          kMsPerNanosecond * static_cast<double>(now.tv_nsec);
 }
 
-/// Adds up the CPU time of the stages of keyframes. A keyframe enters the stage of the sweep twice:
-/// for pose packets and back-projection (`warp_ms`), and for votes and fusion.
+/// Adds up the CPU time of the stages of keyframes. A keyframe enters the sweep stage twice: first
+/// for pose packets and back-projection (`warp_ms`), then for votes and fusion (`sweep_ms`).
 class StageClock : public StageHook {
  public:
   double warp_ms = 0;

@@ -18,13 +18,13 @@
 
 namespace efm::bench {
 
-/// An even motion over a window, around the pose at its middle.
+/// A motion of constant speed during a window, around the pose at the middle of the window.
 struct WindowMotion {
   const char* name = "";
   Eigen::Vector3d travel_m = Eigen::Vector3d::Zero();
-  double turn_deg = 0;  ///< To the right.
-  /// Distance in front of the rig of the point that it circles, looking at it. 0: it turns on the
-  /// spot.
+  double turn_deg = 0;  ///< Rotation to the right.
+  /// Distance from the rig to a point in front of it. The rig circles this point and looks at it.
+  /// If 0, the rig turns on the spot.
   double circled_m = 0;
 };
 
@@ -35,18 +35,18 @@ struct SyntheticWindowOptions {
   int width = 346;
   int height = 260;
   std::size_t events_per_camera = 235'000;
-  int cameras = 2;  ///< Side by side, 0.1 m apart.
+  int cameras = 2;  ///< Cameras side by side, 0.1 m apart.
   double duration_s = 0.2;
   unsigned seed = 1;
-  std::optional<WindowMotion> motion = {};  ///< Not given: hand-held.
-  /// A wide lens with strong radial distortion. Events keep the pixels of the pinhole: times are
-  /// right, depths are not.
+  std::optional<WindowMotion> motion = {};  ///< If empty: hand-held.
+  /// A wide lens with strong radial distortion. Events keep the pixels of the pinhole model: run
+  /// times are realistic, depths are wrong.
   bool strong_lens = false;
 };
 
-/// The events of a window of a rig that looks at straight edges 1 to 6 m away. Every
-/// tenth event is noise. They are made from the edges without images: millions of events in less
-/// than a second, with positions and times like real events.
+/// A window of events of a rig that looks at straight edges 1 to 6 m away. Every tenth event is
+/// noise. Events are computed from the edges without images: millions of events in less than a
+/// second, with positions and times like real events.
 struct SyntheticWindow {
   Rig rig;
   Trajectory trajectory;
@@ -57,12 +57,12 @@ struct SyntheticWindow {
 
 SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options);
 
-/// The input of a sweep: events as rays.
+/// The input of a sweep: the rays of events.
 struct SweepInput {
   ReferenceView view;
   DepthPlanes planes;
   std::vector<CameraRays> cameras;
-  std::vector<PosePackets> packets;  ///< Per camera, of its events.
+  std::vector<PosePackets> packets;  ///< The packets of each camera.
 };
 
 /// Back-projects the window's cameras into the view of the first.

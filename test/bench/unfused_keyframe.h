@@ -16,10 +16,10 @@
 
 namespace efm::bench {
 
-/// A keyframe in the way of the published research code of this method, the reference for the fused
-/// sweep. Each camera votes into its own volume with the plain kernel. The fusion copies the
+/// A keyframe computed like in the published research code of this method: the reference for the
+/// fused sweep. Each camera votes into its own volume with the plain kernel. The fusion copies the
 /// volumes and computes their harmonic mean. The peaks are searched in the fused volume. Packets,
-/// rays and depth extraction are the mapper's. One thread, no sub-intervals.
+/// rays and depth extraction are those of the mapper. It uses one thread and no sub-intervals.
 ///
 /// The volumes are kept from one keyframe to the next, so their memory is allocated once.
 class UnfusedKeyframe {
@@ -27,7 +27,7 @@ class UnfusedKeyframe {
   /// All cameras of the rig are used.
   UnfusedKeyframe(const Rig& rig, const KeyframeMapperOptions& options);
 
-  /// @return nothing where the reference time has no pose.
+  /// @return std::nullopt if the reference time has no pose.
   std::optional<DepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                               const Trajectory& trajectory, StageHook* stages = nullptr);
 

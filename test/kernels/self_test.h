@@ -9,10 +9,10 @@
 
 namespace efm::kernels {
 
-/// Compares the functions of a kernel with plain code, on a small random input. Takes some
+/// Compares the functions of a kernel with plain code on a small random input. Takes a few
 /// milliseconds.
 /// @param kernel one of `availableKernels`.
-/// @return what differs, one line each; empty if nothing does.
+/// @return one line for each function that differs; empty if all agree.
 std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed);
 
 }  // namespace efm::kernels

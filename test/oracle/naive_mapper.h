@@ -20,9 +20,9 @@
 
 namespace efm::oracle {
 
-/// The method, written as simply as possible and in double precision: every event is a ray in space
-/// and meets every plane by itself; every DSI is a whole volume. Tests compare the fast code with
-/// it.
+/// The method, written as simply as possible and in double precision. The ray of every event is
+/// intersected with every plane; every DSI is a whole volume. Tests compare the fast code with this
+/// code.
 
 /// A whole DSI: [plane][row][column].
 struct Dsi {
@@ -36,49 +36,49 @@ struct Dsi {
   double at(int plane, int x, int y) const;
 };
 
-/// An event as a ray: where its camera was in the reference view.
+/// An event and the pose of its camera in the reference view.
 struct PosedEvent {
   Event event;
   Rigid3 T_ref_cam;
 };
 
-/// Each event with the pose of its own time. Events without a pose are left out.
+/// Returns each event with the pose of its own time. Events without a pose are left out.
 std::vector<PosedEvent> poseEach(const std::vector<Event>& events, const RigCamera& camera,
                                  const Trajectory& trajectory, const Rigid3& T_world_ref);
-/// Each event with the pose of its packet.
+/// Returns each event with the pose of its packet.
 std::vector<PosedEvent> poseByPacket(const std::vector<Event>& events, const PosePackets& packets);
 
-/// The ray density of one camera's events (Ghosh and Gallego 2022, Eq. 2).
+/// Returns the ray density of one camera's events (Ghosh and Gallego 2022, Eq. 2).
 Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& undistortion,
                const ReferenceView& view, const DepthPlanes& planes);
 
-/// The mean of numbers under a rule, from its textbook formula.
+/// Returns the mean of numbers under a rule, from the textbook formula.
 double fuse(FusionRule rule, const std::vector<double>& values);
 Dsi fuse(FusionRule rule, const std::vector<Dsi>& inputs);
 
-/// The events of the window [t0, t1) by sub-interval; windows of up to 100 days.
+/// Splits the events of the window [t0, t1) into sub-intervals. Windows may last up to 100 days.
 std::vector<std::vector<Event>> splitEvents(const std::vector<Event>& events, std::int64_t t0_ns,
                                             std::int64_t t1_ns, int count, SubintervalSplit split);
 
-/// One number, or DSI, per camera and slot of the time axis, [camera][slot], fused along both axes
-/// in their order (Ghosh and Gallego 2022, Algorithm 2).
+/// Fuses numbers or DSIs, [camera][slot of the time axis], along both axes in the order of the
+/// options (Ghosh and Gallego 2022, Algorithm 2).
 double fuse(const FusionOptions& options, const std::vector<std::vector<double>>& values);
 Dsi fuse(const FusionOptions& options, const std::vector<std::vector<Dsi>>& inputs);
 
-/// Per pixel the plane of the largest value, the nearest of equals.
+/// Returns per pixel the plane of the largest value. Of equal values, the nearest plane is used.
 std::vector<int> peakPlanes(const Dsi& dsi);
-/// Per pixel the largest value.
+/// Returns per pixel the largest value.
 std::vector<double> peakValues(const Dsi& dsi);
 
-/// The steps of `efm::extractDepth` written down one after the other, each over the whole image.
+/// Runs the steps of `efm::extractDepth` one after another, each on the whole image.
 DepthMap extractDepth(const DsiPeaks& peaks, const DepthPlanes& planes,
                       const DepthExtractionOptions& options,
                       std::optional<double> sequence_maximum = std::nullopt);
 
-/// `extractAggregated` written down as simply as possible, in double precision and from the whole
-/// DSI: every step looks at every pixel, no ray is rounded and none is left out.
-/// @param dsi [plane][row][column]. Without dilation.
-/// @param step_planes the unit of distances between peaks; parabolas go through the next planes.
+/// Computes `extractAggregated` as simply as possible, in double precision, from the whole DSI.
+/// Every step visits every pixel; columns of the DSI are neither rounded nor left out.
+/// @param dsi [plane][row][column]. Depths are not dilated.
+/// @param step_planes unit of distances between peaks, in planes. Parabolas use adjacent planes.
 DepthMap extractAggregated(const std::vector<float>& dsi, const cv::Size& size,
                            const DepthPlanes& planes, const DepthExtractionOptions& options,
                            double step_planes);

@@ -9,7 +9,7 @@
 
 namespace efm::test {
 
-/// Whether two continuous images have the same bits.
+/// Returns whether two continuous images have the same bits.
 inline bool same(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() &&
          std::equal(a.datastart, a.dataend, b.datastart);

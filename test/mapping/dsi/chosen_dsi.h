@@ -37,7 +37,7 @@ class WholeDsi : public DsiSink {
   std::vector<float> values;
 };
 
-/// The difference from the oracle's DSI, as a fraction of its mass.
+/// Returns the sum of absolute differences from the oracle's DSI / the sum of the oracle's DSI.
 inline double errorOverMass(const std::vector<float>& values, const oracle::Dsi& exact) {
   EXPECT_EQ(values.size(), exact.values.size());
   double mass = 0;
@@ -74,7 +74,7 @@ struct ChosenDsi {
     }
   }
 
-  /// Its peaks, found one by one, and the columns of all pixels that have any value.
+  /// Returns the peaks, found pixel by pixel, and the columns of all pixels with a value.
   SweptDsi swept() const {
     constexpr int kWindowBeyondAllTiles = 1001;
     DsiPeaks peaks{cv::Mat1f::zeros(size), cv::Mat1i::zeros(size), cv::Mat1f(size, -1.0F),
@@ -105,7 +105,7 @@ struct ChosenDsi {
     return {std::move(peaks), DsiColumns(size, planes, std::move(all))};
   }
 
-  /// The values as its columns have them: rounded.
+  /// Returns the values rounded as in the columns.
   ChosenDsi rounded() const {
     const DsiColumns columns = swept().columns;
     ChosenDsi copy(size, planes);

@@ -16,7 +16,7 @@
 
 namespace efm::test {
 
-/// The keyframe of a recording of one window: `RandomRecording`, or any with its members.
+/// Maps a recording of one window: `RandomRecording` or a type with the same members.
 template <typename Recording>
 KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
                      const KeyframeMapperOptions& options, DsiSink* sink = nullptr) {
@@ -33,9 +33,9 @@ struct Played {
   MapperCounts counts;
 };
 
-/// Over half a second of random motion and events of three cameras, with everything that real ones
-/// have: a gap in the poses, events before and after them, a time offset, and many events at the
-/// same time.
+/// More than half a second of random motion and events of three cameras. As in real recordings, the
+/// poses have a gap, events begin before and end after the poses, camera 1 has a time offset, and
+/// many events have the same time.
 struct LongRecording {
   static constexpr std::int64_t kMs = 1'000'000;
   static constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
@@ -52,7 +52,7 @@ struct LongRecording {
         kStart_ns + static_cast<std::int64_t>(random.uniform(100, 400)) * kMs;
     const Trajectory motion = random.motion(kStart_ns, 0.55, 0.2 * speed_m_s, 0.5);
     for (StampedPose pose : motion.poses()) {
-      // A steady motion beneath the random one.
+      // A steady motion is added to the random motion.
       const double since_s = 1e-9 * static_cast<double>(pose.t_ns - kStart_ns);
       pose.T_world_rig.translation.x() += speed_m_s * since_s;
       if (pose.t_ns < gap_ns || pose.t_ns > gap_ns + 70 * kMs) poses.push_back(pose);
@@ -66,7 +66,7 @@ struct LongRecording {
     }
   }
 
-  /// An event's time on the trajectory's clock.
+  /// Returns an event's time on the trajectory's clock.
   std::int64_t timeOf(std::size_t camera, const Event& event) const {
     return event.t_ns + rig.cameras[camera].time_offset_ns;
   }
@@ -77,7 +77,7 @@ struct LongRecording {
   }
 };
 
-/// Few planes, cameras 0 and 1 of three.
+/// Returns options with few planes and with cameras 0 and 1 of three.
 inline FusionMapperOptions playedOptions() {
   FusionMapperOptions options;
   options.trajectory.max_pose_gap_s = LongRecording::kMaxPoseGap_s;
@@ -87,8 +87,8 @@ inline FusionMapperOptions playedOptions() {
   return options;
 }
 
-/// Gives a recording to a mapper in packets of random sizes and in random order; with seed 0 as a
-/// whole. Its duration is below the second that lets a camera pass for silent.
+/// Gives a recording to a mapper in packets of random size and order, or as a whole if the seed is
+/// 0. The recording is shorter than the 1 s after which a camera without data counts as silent.
 inline Played play(const LongRecording& recording, const FusionMapperOptions& options,
                    std::uint32_t cut_seed) {
   Played played;

@@ -23,7 +23,7 @@ class RandomScene {
     return std::uniform_real_distribution<double>(from, to)(random_);
   }
 
-  /// A pose at most `distance_m` from the origin on each axis, rotated by at most `angle_rad`.
+  /// Draws a pose up to `distance_m` from the origin on each axis, rotated by up to `angle_rad`.
   Rigid3 pose(double distance_m, double angle_rad) {
     const Eigen::Vector3d axis(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     return {
@@ -31,7 +31,7 @@ class RandomScene {
         Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)) * distance_m};
   }
 
-  /// Hand-held motion: a pose every 5 ms, metres and radians per second as given.
+  /// Draws a hand-held motion with a pose every 5 ms. Speeds are in metres and radians per second.
   Trajectory motion(std::int64_t t0_ns, double duration_s, double speed_m_s,
                     double rotation_rad_s) {
     constexpr double kStep_s = 0.005;
@@ -44,7 +44,7 @@ class RandomScene {
     return trajectory;
   }
 
-  /// Events all over the sensor, in time order over [t0, t0 + duration).
+  /// Draws events on the whole sensor, in time order over [t0, t0 + duration).
   std::vector<Event> events(const CameraModel& model, std::size_t count, std::int64_t t0_ns,
                             std::int64_t duration_ns) {
     std::vector<std::int64_t> times(count);
@@ -71,18 +71,18 @@ inline CameraModel smallCamera() {
   return {48, 36, 31.0, 31.5, 23.2, 17.8, DistortionModel::kRadtan, {-0.14, 0.09, 0.0003, 0.0002}};
 }
 
-/// Its model folds the image over: pixels more than 17 px from the centre have no ray.
+/// Returns a camera whose lens folds over: pixels more than 17 px from the centre have no ray.
 inline CameraModel foldingCamera() {
   CameraModel model = smallCamera();
   model.coefficients = {-0.5, 0, 0.0003, 0.0002};
   return model;
 }
 
-/// Random events of some cameras in motion: one window full.
+/// Random events of some moving cameras during one window.
 struct RandomRecording {
   static constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'001;
   static constexpr std::int64_t kDuration_ns =
-      100'000'007;  // no number of sub-intervals divides it
+      100'000'007;  // not divisible by the number of sub-intervals
   static constexpr Window kWindow{kStart_ns, kStart_ns + kDuration_ns,
                                   kStart_ns + kDuration_ns / 2};
 

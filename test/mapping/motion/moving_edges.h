@@ -14,8 +14,8 @@
 
 namespace efm::test {
 
-/// Upright edges at several depths, past which cameras side by side move to the right: events as
-/// they would fire, each edge of one polarity, and exact depths.
+/// Cameras side by side that move to the right past upright edges at several depths. Each edge
+/// fires events of one polarity. Depths are exact.
 struct MovingEdges {
   static constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
   static constexpr std::int64_t kDuration_ns = 200'000'000;
@@ -30,7 +30,7 @@ struct MovingEdges {
   struct Edge {
     double x_m = 0;
     double z_m = 0;
-    int first_row = 0;  ///< The same in all images: nothing moves upward.
+    int first_row = 0;  ///< The same in all images: rows do not change.
     int last_row = 0;
     bool polarity = false;
   };
@@ -64,7 +64,8 @@ struct MovingEdges {
   }
   std::vector<EventSpan> spans() const { return {events.begin(), events.end()}; }
 
-  /// How far a pixel of camera 0 at the reference time is from the nearest edge of a depth, pixels.
+  /// Returns the distance (px) from a pixel of camera 0 at the reference time to the nearest edge
+  /// whose inverse depth differs from 1 / `z_m` by up to `tolerance` (1/m).
   double offEdge(double x_px, double y_px, double z_m, double tolerance) const {
     double nearest = INFINITY;
     for (const Edge& edge : edges) {
@@ -83,7 +84,7 @@ struct MovingEdges {
     return kFocal_px * (edge.x_m + 0.15 - camera_x_m) / edge.z_m + 59.5;
   }
 
-  /// An edge fires all along itself whenever it comes to another column.
+  /// Returns the events of a camera. All rows of an edge fire when the edge enters another column.
   std::vector<Event> eventsOf(double offset_m) const {
     std::vector<Event> fired;
     for (const Edge& edge : edges) {
@@ -91,7 +92,7 @@ struct MovingEdges {
       for (std::int64_t t_ns = 0; t_ns < kDuration_ns; t_ns += 50'000) {
         const long column = std::lround(columnOf(edge, x_m(t_ns) + offset_m));
         if (column == before) continue;
-        // It crosses from one column into the next, halfway between their centres.
+        // The edge enters the next column halfway between the centres of the two columns.
         before = column;
         if (column < 0 || column >= kWidth) continue;
         for (int row = edge.first_row; row <= edge.last_row; ++row) {

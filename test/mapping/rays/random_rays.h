@@ -12,7 +12,7 @@
 
 namespace efm::test {
 
-/// Where the rays of a packet come from, and the plane on which a test chooses where they are.
+/// The centre of a packet's rays, and the plane on which a test chooses the positions of the rays.
 struct RaySource {
   Eigen::Vector3d center_ref = Eigen::Vector3d::Zero();
   bool forward = true;
@@ -32,7 +32,7 @@ inline void appendPacket(const RaySource& source, const ReferenceView& view,
   bundle.packets.push_back(packet);
 }
 
-/// Rays from the view's own centre: at the same pixels on every plane, and exactly there.
+/// Returns rays from the view's own centre. They are exactly at the same pixels on every plane.
 inline RayBundle raysFromOrigin(const std::vector<Eigen::Vector2d>& points) {
   RayBundle bundle;
   appendPacket({}, ReferenceView{1, 1, 1, 1, 0, 0}, points, bundle);
@@ -49,7 +49,7 @@ class RandomRays {
   }
   int integer(int from, int to) { return std::uniform_int_distribution<int>(from, to)(random_); }
 
-  /// A view of some 60 to 120 degrees.
+  /// Draws a view with a field of view of about 60 to 120 degrees.
   ReferenceView view(const cv::Size& size) {
     const double focal = std::max(size.width, size.height) * uniform(0.3, 0.9);
     return {size.width,
@@ -66,9 +66,9 @@ class RandomRays {
                         uniform(0, 1) < 0.5 ? PlaneSpacing::kInverse : PlaneSpacing::kLinear});
   }
 
-  /// Rays of packets of up to 200, around the view on some plane; every eighth looks backward. Half
-  /// of the bundles come from centres close to the view's, in others they are between the planes
-  /// and behind them too.
+  /// Draws packets of up to 200 rays that meet a random plane in or near the view. In half of the
+  /// bundles all centres are close to the view's centre. In the others some centres are between or
+  /// behind the planes, and one packet of eight looks backward.
   RayBundle bundle(const ReferenceView& view, const DepthPlanes& planes, int rays) {
     const double nearest = planes.depth(0);
     const double farthest = planes.depth(planes.size() - 1);
@@ -87,7 +87,7 @@ class RandomRays {
     return bundle;
   }
 
-  /// In the view and a tenth of it around.
+  /// Draws points in the view and in a margin of a tenth of its size.
   std::vector<Eigen::Vector2d> points(const ReferenceView& view, int count) {
     std::vector<Eigen::Vector2d> points;
     for (int i = 0; i < count; ++i) {

@@ -15,15 +15,15 @@
 
 namespace efm::test {
 
-/// A rig before short edges, each at one depth. A point of an edge has an event wherever it enters
-/// another pixel.
+/// A rig in front of short edges, each at one depth. A point of an edge fires an event when it
+/// enters another pixel.
 struct EdgeWorld {
   double near_m = 1;
   double far_m = 3;
   double duration_s = 1.6;
   int edges = 40;
-  double pixel_noise = 0.3;  ///< Standard deviation, so that edges are not perfect.
-  /// The rig's motion as the time goes by, seconds.
+  double pixel_noise = 0.3;  ///< Standard deviation: edges are not perfect.
+  /// The rig's pose as a function of the time in seconds.
   Rigid3 (*T_world_rig)(double) = handHeld;
 
   static Rigid3 handHeld(double t_s) {
@@ -45,7 +45,7 @@ struct EdgeWorld {
     return rig;
   }
 
-  /// The whole time as one sample. A pose every 5 ms.
+  /// Returns the whole duration as one sample, with a pose every 5 ms.
   WindowSample sample(const Rig& rig) const {
     std::mt19937 random(1);
     std::uniform_real_distribution<double> uniform(0, 1);

@@ -16,10 +16,10 @@ namespace efm::test {
 /// Three tiles by three, the last of which ends at the view's border.
 inline const ReferenceView kTiledView{150, 130, 100, 100, 75, 65};
 
-/// A pixel in the unit of a tile's rays.
+/// One pixel in the unit of a tile's rays.
 inline constexpr float kTileUnit = 1 << kernels::kFractionBits;
 
-/// Rays that meet every plane at points of the view, in pixels, for a tile to vote with.
+/// Returns a tile's rays that meet every plane at the given points of the view (pixels).
 inline TileRays raysAt(const std::vector<Eigen::Vector2d>& points, const cv::Point& origin) {
   TileRays rays;
   rays.reserve(points.size());
@@ -62,12 +62,12 @@ inline SweepOutput sweep(const SweepCase& input, VotingKernel kernel, int thread
   return {dsi.values, std::move(result)};
 }
 
-/// How one DSI differs from another.
+/// The difference of a DSI from a reference.
 struct DsiDifference {
-  double mass = 0;          ///< Of the other.
-  double error_sum = 0;     ///< Of absolute differences.
-  double error = 0;         ///< The same as a fraction of the mass.
-  double signed_error = 0;  ///< Of the masses, as a fraction.
+  double mass = 0;          ///< Sum of the reference.
+  double error_sum = 0;     ///< Sum of absolute differences.
+  double error = 0;         ///< error_sum / mass.
+  double signed_error = 0;  ///< Difference of the sums / mass.
 };
 
 template <typename Reference>

@@ -17,7 +17,7 @@ inline bool sameBits(const MapCloud& a, const MapCloud& b) {
                     });
 }
 
-/// The points of a cloud in the world.
+/// Returns the points of a cloud in the world.
 inline std::vector<CloudPoint> worldPoints(const MapCloud& cloud) {
   std::vector<CloudPoint> points;
   for (const MapPoint& point : cloud) {

@@ -21,7 +21,7 @@ using Edges = std::vector<Edge>;
 
 inline ReferenceView smallView() { return {160, 120, 130, 130, 79.5, 59.5}; }
 
-/// Edges of 0.5 to 1.5 m with any direction, 2 to 4 m around the y axis of the world.
+/// Draws edges of 0.5 to 1.5 m with any direction, 2 to 4 m from the y axis of the world.
 inline Edges edgesAround(int count, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   Edges world;
@@ -37,19 +37,19 @@ inline Edges edgesAround(int count, std::mt19937& random) {
   return world;
 }
 
-/// Edges along x on one wall.
+/// Returns edges along x on one wall.
 inline Edges stripes() {
   Edges world;
   for (int y = -4; y <= 4; ++y) world.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
   return world;
 }
 
-/// A view along z, rotated by a yaw angle. The y axes of the world and the view point down.
+/// Returns a view along z, rotated by a yaw angle. The y axes of the world and the view point down.
 inline Rigid3 viewTurned(double yaw_rad, const Eigen::Vector3d& p_world) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY())), p_world};
 }
 
-/// A keyframe without any points.
+/// Returns a keyframe without points.
 inline KeyframeDepthMap emptyKeyframe(const ReferenceView& view) {
   KeyframeDepthMap keyframe;
   keyframe.view = view;
@@ -59,8 +59,8 @@ inline KeyframeDepthMap emptyKeyframe(const ReferenceView& view) {
   return keyframe;
 }
 
-/// The nearest edge in each pixel of a view. Inverse depths have the error `sigma` (1/m), and state
-/// it as their variance.
+/// Returns the depth of the nearest edge in each pixel of a view. Inverse depths have a noise of
+/// `sigma` (1/m); their stated variance is `sigma` squared.
 inline KeyframeDepthMap seenFrom(const Edges& world, const Rigid3& T_world_ref, double sigma,
                                  std::mt19937& random) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
@@ -90,10 +90,10 @@ inline KeyframeDepthMap seenFrom(const Edges& world, const Rigid3& T_world_ref, 
   return keyframe;
 }
 
-/// The error of a good keyframe: 1 cm at 2 m, 4 cm at 4 m.
+/// The error of a good keyframe: 1 cm at a depth of 2 m, 4 cm at 4 m.
 constexpr double kInverseDepthSigma = 0.0025;  // 1/m
 
-/// Keeps the first depths of a keyframe only.
+/// Keeps only the first `count` depths of a keyframe.
 inline void keepFirst(int count, KeyframeDepthMap& keyframe) {
   for (float& depth : keyframe.map.depth) {
     if (depth > 0 && count-- <= 0) depth = 0;

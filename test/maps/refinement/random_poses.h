@@ -9,7 +9,7 @@
 
 namespace efm::test {
 
-/// Each component normal with this standard deviation.
+/// Draws a vector of normal components with standard deviation `sigma`.
 inline Eigen::Vector3d drawVector(double sigma, std::mt19937& random) {
   std::normal_distribution<double> normal(0, sigma);
   const double x = normal(random);
@@ -17,7 +17,7 @@ inline Eigen::Vector3d drawVector(double sigma, std::mt19937& random) {
   return {x, y, normal(random)};
 }
 
-/// A small motion: normal translation (metres) and rotation vector (radians).
+/// Draws a small motion: normal translation (metres) and rotation vector (radians).
 inline Rigid3 drawMotion(double sigma_m, double sigma_rad, std::mt19937& random) {
   Vector6d difference;
   difference.head<3>() = drawVector(sigma_m, random);
@@ -25,7 +25,7 @@ inline Rigid3 drawMotion(double sigma_m, double sigma_rad, std::mt19937& random)
   return rigidFromDifference(difference);
 }
 
-/// A uniform rotation and a normal translation.
+/// Draws a uniform rotation and a normal translation.
 inline Rigid3 drawPose(double sigma_m, std::mt19937& random) {
   std::normal_distribution<double> normal;
   Eigen::Vector4d q;
@@ -33,7 +33,7 @@ inline Rigid3 drawPose(double sigma_m, std::mt19937& random) {
   return {Eigen::Quaterniond(q.normalized()), drawVector(sigma_m, random)};
 }
 
-/// A full matrix that is never near singular.
+/// Draws a full matrix that is never near singular.
 template <int size>
 Eigen::Matrix<double, size, size> drawMatrix(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-0.3, 0.3);
@@ -43,8 +43,8 @@ Eigen::Matrix<double, size, size> drawMatrix(std::mt19937& random) {
   return matrix;
 }
 
-/// Moves a pose by d as in `poseCovariance`: a translation along the axes of the world, and a
-/// rotation about them.
+/// Moves a pose by the components of `poseCovariance`: `d` is a translation (metres) along the axes
+/// of the world, and a rotation vector (radians) about them.
 inline Rigid3 moved(const Rigid3& T_world_ref, const Vector6d& d) {
   const Rigid3 motion = rigidFromDifference(d);
   return {(motion.rotation * T_world_ref.rotation).normalized(),
@@ -61,7 +61,7 @@ inline bool sameBits(const Rigid3& a, const Rigid3& b) {
   return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
 }
 
-/// The diagonal covariance of a pose.
+/// Returns the diagonal covariance of a pose.
 inline Matrix6d covarianceOf(double sigma_m, double sigma_rad) {
   Vector6d sigma;
   sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);

@@ -8,13 +8,13 @@
 
 namespace efm::test {
 
-/// A surface of one log intensity.
+/// Returns the painter of a surface with one log intensity.
 inline Scene::Painter evenPaint(float log_intensity) {
   return [log_intensity](double, double) { return Texture(cv::Mat1f(8, 8, log_intensity), 0.1); };
 }
 
-/// An edge along v: log intensity 0 where u is below `edge_u_m`, and `contrast` elsewhere. The edge
-/// must be on a texel's border.
+/// Returns the painter of an edge along v: log intensity 0 if u is below `edge_u_m`, otherwise
+/// `contrast`. The edge must be on the border of a texel.
 inline Scene::Painter edgePaint(double edge_u_m, float contrast, double texel_m) {
   return [=](double width_m, double height_m) {
     cv::Mat1f painting(static_cast<int>(std::lround(height_m / texel_m)),
@@ -24,8 +24,8 @@ inline Scene::Painter edgePaint(double edge_u_m, float contrast, double texel_m)
   };
 }
 
-/// A wall at the z-depth `depth_m` of a camera at the origin: u is x + width/2 and v is height/2 -
-/// y, frame `world` (x right, y down, z forward).
+/// Returns a wall at the z-depth `depth_m` of a camera at the origin: u = x + width/2 and v =
+/// height/2 - y, frame `world` (x right, y down, z forward).
 inline Rectangle facingWall(double depth_m, double width_m, double height_m) {
   return {{-width_m / 2, height_m / 2, depth_m},
           Eigen::Vector3d::UnitX(),
@@ -34,7 +34,7 @@ inline Rectangle facingWall(double depth_m, double width_m, double height_m) {
           height_m};
 }
 
-/// A straight line at constant speed, from the origin, without rotation.
+/// A straight motion at constant speed from the origin, without rotation.
 class StraightMotion : public Motion {
  public:
   explicit StraightMotion(const Eigen::Vector3d& velocity) : velocity_(velocity) {}
