@@ -21,7 +21,7 @@
 namespace efm::bench {
 namespace {
 
-/// A keyframe of a window, with the paper's fusion and depths unless it is as shipped.
+/// A keyframe of a window, with the paper's fusion and depth extraction or with the defaults.
 struct KeyframeCase {
   VotingKernel kernel = VotingKernel::kPlain;
   int threads = 1;
@@ -68,7 +68,7 @@ void makeKeyframes(benchmark::State& state, const SyntheticWindow& made, const K
   countVotes(state, made, what.planes);
 }
 
-/// A line of /proc/self/status, in MB of 1e6 bytes; 0 without it.
+/// Returns a line of /proc/self/status in MB (1e6 bytes); 0 if the line is missing.
 double statusLine_mb(const std::string& key) {
   constexpr double kMbPerKib = 1024e-6;
   std::ifstream status("/proc/self/status");
@@ -79,8 +79,8 @@ double statusLine_mb(const std::string& key) {
   return kMbPerKib * kib;
 }
 
-/// The additional peak memory of this process while `work` runs; NaN where the system, unlike
-/// Linux, cannot reset the peak. Google Benchmark's MemoryManager would run every benchmark again.
+/// Returns the additional peak memory of this process while `work` runs; NaN if the system cannot
+/// reset the peak (Linux can). Google Benchmark's MemoryManager would run every benchmark again.
 template <typename Work>
 double peakMemory_mb(const Work& work) {
   malloc_trim(0);  // kept free memory would hide new memory
@@ -92,8 +92,8 @@ double peakMemory_mb(const Work& work) {
 }
 
 /// Adds a keyframe with its stages and its memory without the events.
-/// @param prepare a window for a function that makes its keyframe. Its memory counts as the
-/// keyframe's, its time does not.
+/// @param prepare returns a function that maps the keyframe of a window. The memory of `prepare`
+/// counts as the keyframe's, its time does not.
 template <typename LazyWindow, typename Prepare>
 void addStages(const std::string& name, const LazyWindow& window, const Prepare& prepare) {
   add(name, [=, peak_mb = std::optional<double>()](benchmark::State& state) mutable {
@@ -111,8 +111,8 @@ void addStages(const std::string& name, const LazyWindow& window, const Prepare&
   });
 }
 
-/// Stereo keyframes, fused and unfused. Kernels between the plain and the fastest one run with the
-/// smallest size on one thread only.
+/// Adds stereo keyframes, fused and unfused. Kernels other than the plain and the fastest kernel
+/// run with the smallest sensor on one thread only.
 void addStereo(const SensorSize& sensor, bool smallest) {
   const auto window = lazily([=] { return makeSyntheticWindow(sensor.window(2)); });
   const std::string name = "keyframe/" + sensor.name() + "/";
@@ -141,7 +141,7 @@ void addStereo(const SensorSize& sensor, bool smallest) {
   }
 }
 
-/// A keyframe as shipped and with the paper's options.
+/// Adds a keyframe with the default options and with the paper's options.
 void addMotion(const std::string& name, const SyntheticWindowOptions& window,
                int subintervals = 1) {
   const auto made = lazily([=] { return makeSyntheticWindow(window); });
@@ -155,7 +155,7 @@ void addMotion(const std::string& name, const SyntheticWindowOptions& window,
   }
 }
 
-/// Stereo keyframes for several motions and rigs.
+/// Adds stereo keyframes for several motions and rigs.
 void addMotions(const Sensors& sensors) {
   const std::vector<WindowMotion> motions = {
       {"sideways", {0.5 * kNearLimit_m, 0, 0}},
@@ -187,8 +187,8 @@ void addMotions(const Sensors& sensors) {
   addMotion(smallest.name() + " 8 sub-intervals", smallest.window(2), 8);
 }
 
-/// Stereo keyframes with one size 1, 2, 4, 8 and 16 times as large.
-/// @param grow makes the size of the window or of the case `factor` times as large.
+/// Adds stereo keyframes with one size multiplied by 1, 2, 4, 8 and 16.
+/// @param grow multiplies the size in the window or in the case by `factor`.
 template <typename Grow>
 void addGrowth(const std::string& name, const SyntheticWindowOptions& smallest, const Grow& grow) {
   const auto windows = std::make_shared<std::map<int, SyntheticWindow>>();  // by factor

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A live pipeline as a host has it: one thread feeds a recording to the map builder at the sensor's
-// speed, another one asks for every result 50 times a second. Prints how long the calls took, what
-// was lost and how the memory grew.
+// Simulates a live host: one thread feeds a recording to the map builder at the sensor's speed,
+// another thread asks for every result 50 times a second. Prints the durations of the calls, the
+// lost data and the growth of memory.
 #include <fmt/format.h>
 #include <malloc.h>
 #include <mrpt/maps/CSimpleMap.h>
@@ -43,13 +43,13 @@ struct Arguments {
   double seconds = 0;
   double speed = 1;
   int rate = 1;
-  std::vector<double> lost;         // the tracker is silent from, to
-  std::vector<double> silent;       // camera 1 is silent from, to
-  std::vector<double> jumps;        // the tracker jumps at these times
-  std::vector<double> ahead;        // an event comes 100 s ahead at these times
-  std::vector<double> ahead_poses;  // a pose does
-  std::vector<double> back;         // all clocks go back by 100 s
-  bool late = false;                // an event of each packet of camera 1 comes 20 ms late
+  std::vector<double> lost;         // from and to: the tracker is silent
+  std::vector<double> silent;       // from and to: camera 1 is silent
+  std::vector<double> jumps;        // times: the tracker jumps
+  std::vector<double> ahead;        // times: an event is 100 s ahead
+  std::vector<double> ahead_poses;  // times: a pose is 100 s ahead
+  std::vector<double> back;         // times: all clocks go back by 100 s
+  bool late = false;                // one event per packet of camera 1 is 20 ms late
   bool throwing_log = false;        // the host's log throws
 };
 
@@ -75,7 +75,7 @@ class Latencies {
   std::vector<double> all_ms_;
 };
 
-/// Of the process, and how much of it is in use: the rest waits for the next allocation.
+/// Returns the memory of the process and the part in use; the rest is kept for later allocations.
 std::string memory() {
   std::ifstream status("/proc/self/statm");
   double pages = 0;
@@ -92,7 +92,7 @@ std::string refinementOf(const SessionStatus& status) {
                      state->seconds, state->most_seconds, state->counts.loops, state->waiting);
 }
 
-/// A recording that goes on: forward, backward in time, forward again. Each event `rate` times.
+/// An endless recording: forward, backward in time, forward again. Each event comes `rate` times.
 class EndlessRecording {
  public:
   EndlessRecording(std::vector<CObservation::Ptr> forward, int rate)
@@ -160,7 +160,7 @@ std::vector<CObservation::Ptr> readAll(const std::string& path) {
   return observations;
 }
 
-/// Asks for every result 50 times a second, until it is destroyed.
+/// A thread that asks for every result 50 times a second until this object is destroyed.
 class Poller {
  public:
   explicit Poller(CEventFusionMapBuilder& builder) : builder_(builder) {

@@ -41,7 +41,7 @@ std::vector<CloudPoint> keyframeCloud(const SensorSize& sensor) {
   return pointsInWorld(viewPoints(*keyframe), keyframe->T_world_ref);
 }
 
-/// Random points in a hall, in keyframes of a hundred thousand.
+/// Returns random points in a hall, in keyframes of 100,000 points.
 GlobalCloud hallOf(std::uint64_t points) {
   constexpr std::uint64_t kPerKeyframe = 100'000;
   std::mt19937 random(1);
@@ -65,7 +65,7 @@ GlobalCloud hallOf(std::uint64_t points) {
 void addGlobalCloud(const Sensors& sensors) {
   const auto cloud = lazily([sensor = sensors.front()] { return keyframeCloud(sensor); });
   for (const std::uint64_t points : {1'000, 100'000, 10'000'000}) {
-    const auto map = lazily([=] { return hallOf(points); });  // all in memory: they take turns
+    const auto map = lazily([=] { return hallOf(points); });  // all maps stay in memory
     add("global_cloud/insertion/into " + std::to_string(points) + " points",
         [=](benchmark::State& state) {
           GlobalCloud& into = map();
@@ -85,7 +85,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Sets irregular times like a sensor's, about one event per microsecond.
+/// Sets irregular times as of a sensor, about one event per microsecond.
 void makeIrregular(std::vector<Event>& events, std::int64_t tick_ns) {
   std::mt19937_64 random(1);
   const auto end_tick = static_cast<std::int64_t>(events.size()) * 1000 / tick_ns;
@@ -95,7 +95,7 @@ void makeIrregular(std::vector<Event>& events, std::int64_t tick_ns) {
             [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
 }
 
-/// A folder in the UZH layout: one camera, decimal seconds with nine digits.
+/// Writes a folder in the UZH layout: one camera, decimal seconds with nine digits.
 void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
   fs::create_directories(folder);
   const CameraModel& camera = made.rig.cameras.front().model;
@@ -119,7 +119,7 @@ void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
 }
 
 #ifdef EFM_WITH_HDF5
-/// The same in DSEC's layout: HDF5, Blosc with Zstandard.
+/// Writes the window in DSEC's layout: HDF5, Blosc with Zstandard.
 void writeHdf5(const fs::path& folder, const SyntheticWindow& made) {
   const auto writer = openHdf5Writer(folder, {{made.rig.cameras.front()}});
   writer->addEvents(0, made.events.front());
@@ -128,7 +128,7 @@ void writeHdf5(const fs::path& folder, const SyntheticWindow& made) {
 }
 #endif
 
-/// Imports that folder.
+/// Imports a text folder into a rawlog.
 void writeRawlog(const fs::path& file, const fs::path& folder) {
   RecordingSource source;
   source.files = {folder};
@@ -154,7 +154,7 @@ void readAll(benchmark::State& state, const fs::path& path) {
   countRate(state, "events/s", static_cast<double>(events));
 }
 
-/// Decodes the events of a recording's first camera, and does no more with them.
+/// Only decodes the events of a recording's first camera.
 void decodeAll(benchmark::State& state, const fs::path& path) {
   const RecordingFormat& format = *detectFormat(path);
   std::vector<Event> block;
@@ -167,7 +167,7 @@ void decodeAll(benchmark::State& state, const fs::path& path) {
   countRate(state, "events/s", static_cast<double>(events));
 }
 
-/// An edge that many neighbouring pixels see at once: runs of eight in a row.
+/// Returns events of an edge that adjacent pixels see at once: runs of eight in a row.
 std::vector<Event> runsOf(const std::vector<Event>& events, int width) {
   constexpr std::size_t kRun = 8;
   std::vector<Event> runs;
@@ -185,7 +185,7 @@ void writeRaw(const fs::path& file, const std::string& version, EvtEncoding enco
                                         << evtBytes(encoding, events);
 }
 
-/// A folder that exists as long as this object.
+/// A folder with the lifetime of this object.
 class ScratchFolder {
  public:
   ScratchFolder()
@@ -204,7 +204,7 @@ class ScratchFolder {
   fs::path path_;
 };
 
-/// @param tick_ns resolution of the times.
+/// @param tick_ns resolution of the times, nanoseconds.
 SyntheticWindow irregularWindow(std::size_t count, std::int64_t tick_ns) {
   // The sensor of a UZH folder without images has 240x180 pixels.
   SyntheticWindow made = makeSyntheticWindow({240, 180, count, 1});
@@ -232,7 +232,7 @@ void addReading(const Sensors& sensors) {
   const auto add_reading = [](const std::string& name, const auto& path) {
     add("reading/recording/" + name, [=](benchmark::State& state) { readAll(state, path()); });
   };
-  // The bytes per event differ.
+  // The number of bytes per event differs.
   add_reading("rawlog of us",
               file("us.rawlog", [=](const fs::path& path) { writeRawlog(path, text()); }));
   add_reading("rawlog of ns",

@@ -17,7 +17,7 @@
 namespace efm::bench {
 namespace {
 
-/// The two timed programs must do the same work.
+/// The fused and the unfused keyframe are timed: they must do the same work.
 TEST(UnfusedKeyframe, FindsTheDepthsOfTheMapper) {
   SyntheticWindowOptions size;
   size.width = 173;
@@ -53,11 +53,11 @@ using bench::SweepInput;
 using bench::SyntheticWindow;
 using bench::SyntheticWindowOptions;
 
-// Limits of every kernel, compared with the oracle with the same packets.
-constexpr double kMaxError = 1e-3;        // of the mass
-constexpr double kMaxSignedError = 3e-5;  // of the mass
-// Weights are rounded to 1/1024 of a vote. Where two planes differ by less, rounding decides which
-// is the peak: of the pixels with votes.
+// Limits for every kernel, compared with the oracle with the same packets.
+constexpr double kMaxError = 1e-3;        // fraction of the DSI's sum
+constexpr double kMaxSignedError = 3e-5;  // fraction of the DSI's sum
+// Fraction of the pixels with votes. Weights are rounded to 1/1024 of a vote: if two planes differ
+// by less, rounding decides which plane is the peak.
 constexpr double kMinEqualPeaks = 0.975;
 // The min of two cameras is often a single vote, which changes little between planes.
 constexpr double kMinEqualPeaksOfMin = 0.965;
@@ -82,7 +82,7 @@ Keyframe keyframeOf(const SyntheticWindow& made) {
   return keyframe;
 }
 
-/// Half the size of a DAVIS346, with as many events per pixel.
+/// Returns half the size of a DAVIS346 with the same number of events per pixel.
 SyntheticWindowOptions halfSize() {
   SyntheticWindowOptions options;
   options.width = 173;
@@ -96,7 +96,7 @@ const Keyframe& edges() {
   return kKeyframe;
 }
 
-/// The same rig and motion with random events: there are no clear peaks.
+/// Returns a keyframe of the same rig and motion with random events, without clear peaks.
 const Keyframe& noise() {
   static const Keyframe kKeyframe = [] {
     const SyntheticWindowOptions options = halfSize();
@@ -111,7 +111,7 @@ const Keyframe& noise() {
   return kKeyframe;
 }
 
-/// The fraction of pixels with votes whose peak is on the exact plane.
+/// Returns the fraction of pixels with votes whose peak is on the exact plane.
 double equalPeaks(const SweepResult& result, const oracle::Dsi& exact) {
   const std::vector<int> planes = oracle::peakPlanes(exact);
   const std::vector<double> values = oracle::peakValues(exact);

@@ -21,7 +21,7 @@ struct Edge {
   Eigen::Vector3d to;
 };
 
-/// The field of view of a DAVIS346, at any size.
+/// Returns a camera of any size with the field of view of a DAVIS346.
 CameraModel cameraOf(const SyntheticWindowOptions& options) {
   const double scale = options.width / 346.0;
   CameraModel model{options.width,
@@ -49,7 +49,7 @@ Rig rigOf(const SyntheticWindowOptions& options) {
   return rig;
 }
 
-/// Half a metre per second to and fro, with small rotations.
+/// Returns a pose of a motion to and fro at 0.5 m/s with small rotations.
 Rigid3 handHeldPose(double t_s) {
   const Eigen::Vector3d position(0.08 * std::sin(7 * t_s), 0.05 * std::sin(9 * t_s + 1),
                                  0.04 * std::sin(6 * t_s + 2));
@@ -58,7 +58,7 @@ Rigid3 handHeldPose(double t_s) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())), position};
 }
 
-/// @param fraction of the window, -0.5 to 0.5.
+/// @param fraction time as a fraction of the window, -0.5 to 0.5.
 Rigid3 poseOf(const WindowMotion& motion, double fraction) {
   constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
   const Eigen::Quaterniond turn(
@@ -99,7 +99,7 @@ class EventMaker {
   EventMaker(const CameraModel& model, const std::vector<Edge>& edges, std::mt19937& random)
       : pinhole_(ReferenceView::of(model)), edges_(edges), random_(random) {}
 
-  /// An event of a random point of a random edge, or noise.
+  /// Draws an event of a random point of a random edge, or noise.
   Event event(std::int64_t t_ns, const Rigid3& T_cam_world) {
     if (uniform_(random_) >= kNoiseFraction) {
       constexpr int kTries = 20;  // points outside of the image are drawn again

@@ -69,7 +69,7 @@ void UnfusedKeyframe::vote(const RayBundle& rays, Volume& volume) const {
   }
 }
 
-/// The harmonic mean of n values, n / (1/a + 1/b + …), is 0 where one of them is.
+/// The harmonic mean of n values, n / (1/a + 1/b + …), is 0 if one of the values is 0.
 void UnfusedKeyframe::fuse() {
   copies_ = volumes_;  // the research code passes its volumes by value
   const auto inputs = static_cast<float>(copies_.size());
@@ -84,7 +84,7 @@ void UnfusedKeyframe::fuse() {
   }
 }
 
-/// The largest value along each ray; of equals the nearest.
+/// Returns the largest value along each ray; of equal values the nearest.
 DsiPeaks UnfusedKeyframe::findPeaks() const {
   constexpr float kNoValue = -1;
   DsiPeaks peaks{cv::Mat1f(view_.height, view_.width, kNoValue),

@@ -21,7 +21,7 @@
 namespace efm::bench {
 namespace {
 
-/// A plane of ray densities. Half of the voxels are empty, as in a real plane.
+/// Draws a plane of ray densities. Half of the voxels are empty, as in a real plane.
 PlaneValues densities(std::size_t voxels, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> votes(-20, 20);
@@ -34,7 +34,7 @@ void countVoxels(benchmark::State& state, std::size_t voxels) {
   countRate(state, "voxels/s", static_cast<double>(voxels));
 }
 
-/// The mean of two inputs.
+/// Measures the mean of two inputs.
 void fuseTwo(benchmark::State& state, FusionRule rule, std::size_t voxels) {
   const PlaneValues first = densities(voxels, 1);
   const PlaneValues second = densities(voxels, 2);
@@ -48,9 +48,9 @@ void fuseTwo(benchmark::State& state, FusionRule rule, std::size_t voxels) {
   countVoxels(state, voxels);
 }
 
-/// All planes of a DSI.
+/// Measures the running peaks over all planes of a DSI.
 void addPeaks(benchmark::State& state, VotingKernel kernel, std::size_t voxels) {
-  constexpr unsigned kDifferent = 7;  // planes; more would not fit into the cache
+  constexpr unsigned kDifferent = 7;  // different planes; more do not fit into the cache
   std::vector<PlaneValues> values;
   for (unsigned i = 0; i < kDifferent; ++i) values.push_back(densities(voxels, i));
   for (auto _ : state) {
@@ -104,8 +104,8 @@ void countVotes(benchmark::State& state, const SweepInput& input) {
   state.counters["packets"] = static_cast<double>(raysOf(input).packets.size());
 }
 
-/// The reference of the ratios: the plain kernel on one plane that is cleared for each depth. The
-/// transfers of the rays are computed before.
+/// Measures the reference of the ratios: the plain kernel on one plane that is cleared for each
+/// depth. The transfers of the rays are computed before the measurement.
 void voteYardstick(benchmark::State& state, const SweepInput& input) {
   const RayBundle& rays = raysOf(input);
   std::vector<std::vector<kernels::RayTransfer>> transfers;  // per plane
@@ -133,8 +133,8 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
   countVotes(state, input);
 }
 
-/// Votes of the fast kernels, up to the ray density of every plane. As for the yardstick, the rays
-/// are prepared before: they are in bins.
+/// Measures the votes of the fast kernels, up to the ray density of every plane. As for the
+/// reference, the rays are prepared before the measurement: they are in bins.
 void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
   const RayIndex rays(input.cameras, {input.view, input.planes}, kernel);
   TileAccumulator accumulator(kernel);

@@ -19,12 +19,12 @@ constexpr int kTilePixels = kTileCells - 1;
 constexpr int kViewPixels = kTileCells + 1;  // cell (x, y) begins at pixel (x, y) of this view
 constexpr float kUnit = 1 << kFractionBits;
 
-/// Numbers with 1/4096 as their last digit: sums of a few of them are exact in floats.
+/// Random multiples of 1/4096: sums of a few of them are exact in floats.
 class RandomNumbers {
  public:
   explicit RandomNumbers(std::uint32_t seed) : random_(seed) {}
 
-  /// From `from` to below `to`, a multiple of 1/`parts`.
+  /// Draws a multiple of 1/`parts` from `from` to below `to`.
   float operator()(int from, int to, int parts) {
     const auto steps = static_cast<std::uint32_t>((to - from) * parts);
     return static_cast<float>(from) +
@@ -35,7 +35,7 @@ class RandomNumbers {
   std::mt19937 random_;
 };
 
-/// Memory of a tile, aligned as the kernels ask.
+/// The memory of a tile, aligned as the kernels require.
 struct TileMemory {
   alignas(64) float x[kMaxRays + kRayPadding] = {};
   alignas(64) float y[kMaxRays + kRayPadding] = {};
@@ -49,7 +49,7 @@ struct TileMemory {
   float sum[kTilePixels * kTilePixels + kSumPadding] = {};
 };
 
-/// The weights of a cell's votes by pixel, summed in 64 bits.
+/// The sums of the weights of a cell's votes in 64 bits, for each of its four pixels.
 struct CellTotal {
   std::uint64_t upper_left = 0, lower_left = 0, upper_right = 0, lower_right = 0;
 
@@ -67,7 +67,7 @@ struct CellTotal {
 
 using Cells = std::vector<CellTotal>;
 
-/// The functions of one kernel for a tile, against plain code.
+/// Compares the functions of one kernel for a tile with plain code.
 class TileTest {
  public:
   TileTest(VotingKernel kernel, std::uint32_t seed)
@@ -95,7 +95,7 @@ class TileTest {
   MovingRays rays() const { return {memory_->x, memory_->y, memory_->dx, memory_->dy, size_}; }
 
   void gather() {
-    constexpr std::size_t kRays = 3001;  // no multiple of a vector's lanes
+    constexpr std::size_t kRays = 3001;  // not a multiple of a vector's lanes
     constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
     GatherRequest request;
     request.to_first = -0.25F;
@@ -105,7 +105,7 @@ class TileTest {
     std::vector<BinnedRay> bin(kRays + kRayPadding);
     std::vector<std::size_t> near;
     for (std::size_t i = 0; i < kRays; ++i) {
-      const bool on_border = i % 3 == 0;  // often exactly
+      const bool on_border = i % 3 == 0;  // often exactly on the border
       const int parts = on_border ? 2 : 4096;
       const int shift_parts = on_border ? 1 : 1024;
       bin[i] = {random_(-8, 72, parts), random_(-8, 72, parts), random_(-4, 4, shift_parts),
@@ -134,7 +134,7 @@ class TileTest {
     return std::max(first, last) >= 0 && std::min(first, last) < kTileCells;
   }
 
-  /// @return the number of full cells.
+  /// Votes with all rays. @return the number of full cells.
   std::size_t voteAll(float to_plane, std::uint8_t* marks = nullptr) {
     for (std::size_t i = size_; i < size_ + kRayPadding; ++i) {  // left of and above every cell
       memory_->x[i] = memory_->y[i] = -1;
@@ -145,7 +145,7 @@ class TileTest {
                                     memory_->full);
   }
 
-  /// Integer arithmetic, a ray at a time.
+  /// Computes the cells with integer arithmetic, one ray after another.
   Cells plainCells(float to_plane) const {
     Cells cells(kTileCells * kTileCells);
     for (std::size_t i = 0; i < size_; ++i) {
@@ -156,7 +156,7 @@ class TileTest {
       const auto column = static_cast<std::uint32_t>(x);
       const auto row = static_cast<std::uint32_t>(y);
       constexpr std::uint32_t kMask = (1U << kFractionBits) - 1;
-      // b is rounded to the units of weights, and the weights for the pixels on the right.
+      // b and the weights of the pixels on the right are rounded to the unit of weights.
       constexpr std::uint32_t kVote = 1U << kWeightBits;
       constexpr std::uint32_t kHalf = 1U << (kFractionBits - 1);
       const std::uint32_t a = column & kMask;
@@ -200,7 +200,7 @@ class TileTest {
             "resolve: the cells are cleared");
   }
 
-  /// Against the votes of the plain kernel on a whole plane.
+  /// Compares with the votes of the plain kernel on a whole plane.
   void resolve(float to_plane) {
     std::vector<float> plane(kViewPixels * kViewPixels, 0.0F);
     const MovingRays from = rays();
@@ -226,7 +226,7 @@ class TileTest {
     requireEmptyCells();
     for (int y = 0; y < kTilePixels; ++y) {
       for (int x = 0; x < kTilePixels; ++x) {
-        // Weights are rounded to 1/1024, and a pixel has some 30 votes around it.
+        // Weights are rounded to 1/1024, and about 30 votes are around a pixel.
         const float difference = memory_->density[y * kTilePixels + x] -
                                  plane[static_cast<std::size_t>((y + 1) * kViewPixels + x + 1)];
         require(std::abs(difference) <= 1e-2F, "resolve: the densities");
@@ -234,9 +234,9 @@ class TileTest {
     }
   }
 
-  /// Two inputs at once give the bits of each alone and of the plain mean.
+  /// Checks that two inputs at once give the same bits as each input alone and the plain mean.
   void resolvePairs(float to_plane) {
-    if (to_plane > 0) size_ = std::min<std::size_t>(size_, 200);  // few votes, which are marked
+    if (to_plane > 0) size_ = std::min<std::size_t>(size_, 200);  // few votes, with marks
     const FusionFunctions& plain = fusionFunctions();
     const struct {
       ResolveFunctions::AddPair add;
@@ -272,7 +272,7 @@ class TileTest {
     }
   }
 
-  /// Many votes in few cells.
+  /// Casts many votes into few cells.
   void fillCells() {
     size_ = kMaxRays - 3;
     for (std::size_t i = 0; i < size_; ++i) {
@@ -289,11 +289,11 @@ class TileTest {
   const ResolveFunctions& resolve_;
   RandomNumbers random_;
   std::unique_ptr<TileMemory> memory_ = std::make_unique<TileMemory>();
-  std::size_t size_ = 0;  // of the gathered rays
+  std::size_t size_ = 0;  // number of gathered rays
   std::vector<std::string> failures_;
 };
 
-/// Peaks of some planes with many equal values.
+/// Returns the peaks of some planes with many equal values.
 std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t pixels) {
   RandomNumbers random(seed);
   std::vector<float> best(pixels, -1.0F);
@@ -315,7 +315,7 @@ std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t 
   return all;
 }
 
-/// Sums of columns and ranks of positions; arrays with padding.
+/// Returns sums of columns and ranks of positions, computed from arrays with padding.
 std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n) {
   RandomNumbers random(seed);
   std::vector<std::uint8_t> column(n + kColumnPadding);
@@ -340,7 +340,7 @@ std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n
 std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed) {
   std::vector<std::string> failures;
   if (kernel != VotingKernel::kPlain)
-    failures = TileTest(kernel, seed).run();  // plain has no tiles
+    failures = TileTest(kernel, seed).run();  // the plain kernel has no tiles
   const auto differs = [&](const auto& results_of) {
     for (const std::size_t n : {1U, 15U, 16U, 101U}) {
       if (results_of(kernel, seed, n) != results_of(VotingKernel::kPlain, seed, n)) return true;

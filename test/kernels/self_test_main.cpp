@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Runs the self-test of one kernel many times. A program without libraries, for an emulator.
+// Runs the self-test of one kernel many times. Uses no libraries, so that it runs in an emulator.
 //   self_test neon|avx2|...
 #include <algorithm>
 #include <array>

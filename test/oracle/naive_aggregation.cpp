@@ -9,9 +9,9 @@
 namespace efm::oracle {
 namespace {
 
-constexpr int kReach = 4;  ///< Of the window of 9x9 pixels around a pixel.
+constexpr int kReach = 4;  ///< Radius of the window of 9x9 pixels.
 
-/// A pixel that is looked at.
+/// A candidate pixel.
 struct Pixel {
   double excess = 0;
   double position = 0;
@@ -81,7 +81,7 @@ class NaiveAggregation {
       sum += weights.emplace_back(std::exp(-d * d / (2 * sigma * sigma)));
     }
     for (double& weight : weights) weight /= sum;
-    // OpenCV takes the binomial ones for the smallest.
+    // OpenCV uses binomial weights for the smallest windows.
     if (side == 3) weights = {0.25, 0.5, 0.25};
     if (side == 5) weights = {1 / 16.0, 4 / 16.0, 6 / 16.0, 4 / 16.0, 1 / 16.0};
     return weights;
@@ -154,7 +154,7 @@ class NaiveAggregation {
     pixel.peak = best;
   }
 
-  /// Planes on each side that belong to a peak: by the median width of all.
+  /// Returns the number of planes on each side that belong to a peak: from the median peak width.
   int beside() const {
     std::vector<double> widths;
     for (const Pixel& pixel : pixels_) widths.push_back(std::sqrt(pixel.width_sq));

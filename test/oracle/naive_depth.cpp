@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kFrame = 2;  ///< Pixels cleared at each side of the image.
 
-/// The confidence that becomes 255.
+/// Returns the confidence that becomes the grey value 255.
 double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
                std::optional<double> sequence_maximum) {
   if (option.level == WhiteLevel::kFixed) return option.fixed;
@@ -22,14 +22,14 @@ double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
   return max;
 }
 
-/// Grey values of the confidence: 255 at `white`.
+/// Returns the grey values of the confidence: 255 at `white`.
 cv::Mat1b quantise(const cv::Mat1f& confidence, double white) {
   cv::Mat1b grey = cv::Mat1b::zeros(confidence.size());
   if (white > 0) confidence.convertTo(grey, CV_8U, 255.0 / white);  // rounds and clips
   return grey;
 }
 
-/// Adaptive Gaussian thresholding: non-zero where a pixel stands out from its surroundings.
+/// Runs adaptive Gaussian thresholding: non-zero if a pixel stands out from its surroundings.
 cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
   cv::Mat1b mask;
   cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
@@ -37,7 +37,7 @@ cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options)
   return mask;
 }
 
-/// Positions of the peaks between planes, where the mask is set.
+/// Returns the positions of the peaks between planes for the pixels of the mask.
 cv::Mat1f positionsOf(const DsiPeaks& peaks, const cv::Mat1b& mask, bool subplane) {
   cv::Mat1f positions = cv::Mat1f::zeros(mask.size());
   for (int y = 0; y < mask.rows; ++y) {
@@ -75,7 +75,7 @@ cv::Mat1f maskedMedian(const cv::Mat1f& positions, const cv::Mat1b& mask, int wi
   return medians;
 }
 
-/// The image without the frame that is cleared; empty where nothing is left.
+/// Returns the image without the cleared frame; empty if nothing is left.
 cv::Rect insideFrame(cv::Size size) {
   return {kFrame, kFrame, std::max(0, size.width - 2 * kFrame),
           std::max(0, size.height - 2 * kFrame)};
@@ -88,7 +88,7 @@ void clearFrame(cv::Mat1b& mask) {
   mask = inside;
 }
 
-/// The depth map of the mask's pixels.
+/// Returns the depth map of the mask's pixels.
 DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPeaks& peaks,
                   const DepthPlanes& planes) {
   DepthMap result{cv::Mat1f::zeros(mask.size()), peaks.confidence, cv::Mat1f::zeros(mask.size())};
@@ -100,7 +100,7 @@ DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPe
       const double variance =
           peakVariance(peaks.before(y, x), peaks.confidence(y, x), peaks.after(y, x));
       result.depth(y, x) = static_cast<float>(planes.depthAt(position));
-      // A single plane has no step: 0 times infinite would be nothing at all.
+      // A single plane has no step to its neighbours: 0 times infinity would be NaN.
       result.variance(y, x) =
           static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
     }
@@ -108,7 +108,7 @@ DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPe
   return result;
 }
 
-/// Whether the pixel at `a` is the better one to copy from.
+/// Returns whether the depth at `a` is copied rather than the depth at `b`.
 bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
   if (map.confidence(a) != map.confidence(b)) return map.confidence(a) > map.confidence(b);
   return map.depth(a) < map.depth(b);

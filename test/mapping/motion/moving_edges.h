@@ -65,7 +65,7 @@ struct MovingEdges {
   std::vector<EventSpan> spans() const { return {events.begin(), events.end()}; }
 
   /// Returns the distance (px) from a pixel of camera 0 at the reference time to the nearest edge
-  /// whose inverse depth differs from 1 / `z_m` by up to `tolerance` (1/m).
+  /// within `tolerance` (1/m) of the inverse depth.
   double offEdge(double x_px, double y_px, double z_m, double tolerance) const {
     double nearest = INFINITY;
     for (const Edge& edge : edges) {

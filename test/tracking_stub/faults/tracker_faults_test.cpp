@@ -20,7 +20,7 @@ constexpr std::int64_t kFirstNs = 1'000'000'000;
 constexpr std::int64_t kPeriodNs = 10'000'000;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A rig that moves to the right at 0.5 m/s, bobs and rotates.
+/// Returns the poses of a rig that moves to the right at 0.5 m/s, bobs and rotates.
 std::vector<StampedPose> windingWay(int count) {
   std::vector<StampedPose> poses;
   for (std::int64_t i = 0; i < count; ++i) {
@@ -49,7 +49,7 @@ std::map<std::int64_t, Rigid3> byTime(const std::vector<StampedPose>& poses,
   return by_time;
 }
 
-/// Intervals of 0.105 s: some begin at poses, some between poses.
+/// Returns faults in intervals of 0.105 s: some begin at poses, some between poses.
 TrackerFaults keyframeNoise(double noise_m, double noise_rad) {
   TrackerFaults faults;
   faults.perturbation.keyframe = {noise_m, noise_rad, 105'000'000, {}};
@@ -58,7 +58,7 @@ TrackerFaults keyframeNoise(double noise_m, double noise_rad) {
 
 double angleOf(const Eigen::Quaterniond& rotation) { return 2 * rotation.vec().norm(); }
 
-/// @param errors with the rotation from the true pose to the wrong one, and the shift in the world.
+/// @param errors the rotation from the true pose to the wrong pose, and the shift in the world.
 void expectSpread(const std::vector<Rigid3>& errors, double noise_m, double noise_rad) {
   double square_m2 = 0;
   double square_rad2 = 0;
@@ -151,7 +151,7 @@ TEST(KeyframeNoise, MovesAnIntervalRigidlyAndJumpsToTheNextWithinATick) {
   std::vector<Rigid3> errors;
   std::int64_t begin_ns = kFirstNs;
   for (; begin_ns + 105'000'000 <= poses.back().t_ns; begin_ns += 105'000'000) {
-    // The rotation is about the rig: the shift of its position does not grow with the way.
+    // The rotation is about the rig: the shift of its position does not grow with the path length.
     errors.push_back(errorOf(*wrong.poseAt(begin_ns), *truth.poseAt(begin_ns)));
     const Rigid3 T_wrong_world = *wrong.poseAt(begin_ns) * truth.poseAt(begin_ns)->inverse();
     for (const std::int64_t after_ns : {1, 3'333'333, 50'000'000, 101'000'000, 104'999'999}) {
@@ -177,12 +177,12 @@ TEST(KeyframeNoise, InsertsTwoPosesATickApartWhereAnIntervalBeginsButNotInGaps) 
   }
   poses.erase(poses.begin() + 50, poses.begin() + 100);
   faults.perturbation.keyframe.length_ns = 100'000'000;
-  // Intervals begin at poses, as they begin at ticks, or a tick behind: one pose is inserted.
+  // One pose is inserted per interval, because intervals begin at poses (at ticks) or a tick later.
   for (const auto& [start_ns, begins] : {std::pair{kFirstNs + 50, 13U}, {kFirstNs + 100, 15U}}) {
     faults.perturbation.keyframe.start_ns = start_ns;
     faults.perturbation.max_pose_gap_s = 0.5;
     EXPECT_EQ(byTime(poses, faults).size(), poses.size() + begins);
-    faults.perturbation.max_pose_gap_s = 0.51;  // between the poses around the gap
+    faults.perturbation.max_pose_gap_s = 0.51;  // the gap is bridged
     EXPECT_GE(byTime(poses, faults).size(), poses.size() + begins + 10);
   }
 }
@@ -236,7 +236,7 @@ TEST(PerturbedPoses, ThatAreNotUsableStayAndDoNotChangeOthers) {
   EXPECT_TRUE(areSame(withFaults(poses, faults), expected));
 }
 
-/// Times of the poses at 100 Hz that are not lost.
+/// Returns the times of the poses at 100 Hz that are not lost.
 std::set<std::int64_t> keptTimes(const PoseDropoutOptions& dropouts, std::int64_t count = 10'000) {
   std::vector<StampedPose> poses;
   for (std::int64_t i = 0; i < count; ++i) poses.push_back({i * kPeriodNs, {}});
@@ -253,11 +253,11 @@ TEST(PoseDropouts, RandomGapsHaveTheirLengthAndRate) {
   for (auto later = std::next(times.begin()); later != times.end(); ++later) {
     const std::int64_t apart_ns = *later - *std::prev(later);
     if (apart_ns == kPeriodNs) continue;
-    EXPECT_GE(apart_ns, 31 * kPeriodNs);  // two gaps may touch
+    EXPECT_GE(apart_ns, 31 * kPeriodNs);  // two gaps may be adjacent
     ++gaps;
   }
-  // A gap of 30 poses comes 2 s, with a stddev of 2 s, after the one before: 870 in 2000 s, with a
-  // stddev of 26. One of 200 touches the one before.
+  // A gap of 30 poses begins 2 s (stddev 2 s) after the end of the last gap: 870 gaps (stddev 26)
+  // in 2000 s. One gap of 200 is adjacent to the last gap.
   EXPECT_NEAR(gaps, 870 * 0.995, 5 * 26);
   EXPECT_NEAR(200'000 - static_cast<double>(times.size()), 870 * 30, 5 * 26 * 30);
 }

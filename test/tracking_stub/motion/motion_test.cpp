@@ -28,7 +28,7 @@ TEST(LoopMotion, LooksOutwardsAndLevelFromAnEllipse) {
   const Rigid3 T_world_begin = loop.poseAt(1'000'000'000);
   EXPECT_LT((T_world_begin * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(3, 0, 1.5)).norm(), 1e-12);
   EXPECT_LT((T_world_begin * Eigen::Vector3d(0, 1, 0) - Eigen::Vector3d(2, 0, 0.5)).norm(), 1e-12);
-  // A quarter later it is on the +y axis, and +x is to the right of the camera.
+  // A quarter of a loop later the camera is on the +y axis, and +x is to its right.
   const Rigid3 T_world_quarter = loop.poseAt(2'000'000'000);
   EXPECT_LT((T_world_quarter * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(0, 2, 1.5)).norm(),
             1e-12);
@@ -99,7 +99,7 @@ Rigid3 handHeld(double t_s) {
   return T_world_rig;
 }
 
-/// The max distance and angle between a trajectory and a curve, without the first and last 0.25 s.
+/// Returns the max distance and angle between poses and a curve, without the first and last 0.25 s.
 std::pair<double, double> maxError(const std::vector<StampedPose>& poses, const Curve& curve) {
   double metres = 0;
   double radians = 0;
@@ -118,7 +118,7 @@ TEST(SmoothTrajectory, KeepsAMotionOfAFewHertz) {
   ASSERT_EQ(smooth.size(), 801U);
   EXPECT_EQ(smooth[1].t_ns - smooth[0].t_ns, 5'000'000);
   const auto [metres, radians] = maxError(smooth, handHeld);
-  // The error of linear interpolation over 10 ms is a h^2 / 8 = 5e-5 at most.
+  // The error of linear interpolation over h = 10 ms is at most a h^2 / 8 = 5e-5 (a: acceleration).
   EXPECT_LT(metres, 2e-4);
   EXPECT_LT(radians, 2e-4);
 }
@@ -140,7 +140,7 @@ TEST(SmoothTrajectory, CutsFrequenciesAboveTenHertz) {
 TEST(SmoothTrajectory, RemovesSinglePosesThatJump) {
   auto poses = sampled(handHeld, 100, 4);
   RandomNumbers random(5);
-  for (StampedPose& pose : poses) {  // noise of a tenth of a millimetre, as trackers have
+  for (StampedPose& pose : poses) {  // noise of 0.1 mm, as of trackers
     pose.T_world_rig.translation += Vector3d::Constant(random.uniform(-1e-4, 1e-4));
   }
   for (const std::size_t i : {50U, 120U, 121U + 30U, 333U}) {
@@ -175,7 +175,7 @@ TEST(SmoothTrajectory, OdometryOfTenHertzHasNoCorners) {
   };
   const auto smooth = smoothTrajectory(sampled(drive, 10, 8));
   EXPECT_LT(maxError(smooth, drive).first, 0.01);
-  // 0.3 rad/s at 6 m/s: 1.8 m/s2. Corners of straight lines of 0.1 s would be 36 m/s2 in 5 ms.
+  // 0.3 rad/s at 6 m/s are 1.8 m/s2. Corners between lines of 0.1 s would be 36 m/s2 in 5 ms.
   for (std::size_t i = 101; i + 100 < smooth.size(); ++i) {
     const Vector3d bend = smooth[i + 1].T_world_rig.translation -
                           2 * smooth[i].T_world_rig.translation +

@@ -25,7 +25,7 @@ struct VisibleDepths {
   double sky = 0;  ///< Fraction of the rays that hit nothing.
 };
 
-/// Casts every fifth ray in x and y, at 11 times.
+/// Casts the ray of every fifth pixel in x and y at 11 times.
 inline VisibleDepths visibleDepths(const Simulation& simulation, const RigCamera& camera) {
   VisibleDepths depths;
   const PixelRays rays(camera.model);
@@ -72,7 +72,7 @@ std::ostream& operator<<(std::ostream& out, const Promise& promise) {
 
 class Presets : public ::testing::TestWithParam<Promise> {};
 
-/// The max distance between the pixel of an event and the projection of its source.
+/// Returns the max distance between the pixel of an event and the projection of its source.
 double maxSourceError(const Simulation& simulation, std::size_t c,
                       const CameraRecording& recording) {
   const RigCamera& camera = simulation.rig.cameras[c];
@@ -104,14 +104,13 @@ TEST_P(Presets, KeepWhatTheyPromise) {
   if (promise.preset == "desk_stereo") {
     EXPECT_EQ(simulation.duration_ns, 2'000'000'000);
   }
-  if (promise.preset == "room_stereo") {  // it ends at its first pose
+  if (promise.preset == "room_stereo") {  // the motion ends at its first pose
     const Rigid3 T_begin_end = simulation.motion->poseAt(simulation.start_ns).inverse() *
                                simulation.motion->poseAt(simulation.endNs());
     EXPECT_LT(T_begin_end.translation.norm(), 1e-6);
     EXPECT_LT(T_begin_end.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
   }
-  // In the first 4 ms, sources project to their pixels within half a pixel and the motion of a
-  // step.
+  // Sources project to their pixels within half a pixel plus the motion of a step: first 4 ms.
   simulation.duration_ns = 4'000'000;
   const auto recordings = simulateEvents(simulation);
   for (std::size_t c = 0; c < recordings.size(); ++c) {
@@ -172,8 +171,7 @@ using Eigen::Vector3d;
 
 constexpr std::int64_t kStartNs = 5'000'000'000;
 
-/// 10 s at 1 m/s straight ahead, in a world whose z axis is down and forward is x, after 2 s at
-/// rest.
+/// Returns 2 s at rest, then 10 s straight ahead at 1 m/s. World: z is down, x is forward.
 std::vector<StampedPose> walk() {
   Eigen::Matrix3d R_world_cam;
   R_world_cam << 0, 0, 1, 1, 0, 0, 0, 1, 0;
@@ -207,7 +205,7 @@ TEST(TrajectorySimulation, BeginsAtTheStartOfMotionAndLastsFiveSeconds) {
   const Simulation chosen = makeTrajectorySimulation(options, walk(), smallRig());
   EXPECT_EQ(chosen.start_ns, options.start_ns);
   EXPECT_EQ(chosen.duration_ns, 500'000'000);
-  // The motion is the trajectory's.
+  // The motion follows the trajectory.
   EXPECT_LT((chosen.motion->poseAt(chosen.endNs()).translation - Vector3d(9.5, 3, -20)).norm(),
             1e-6);
 }
@@ -215,7 +213,7 @@ TEST(TrajectorySimulation, BeginsAtTheStartOfMotionAndLastsFiveSeconds) {
 TEST(TrajectorySimulation, ScenesAreUprightAroundThePath) {
   struct Case {
     const char* scene;
-    double floor_m;  // below the camera; 0: not looked at
+    double floor_m;  // below the camera; 0: not checked
     double min_depth_m, max_depth_m, sky;
   };
   for (const Case& of :

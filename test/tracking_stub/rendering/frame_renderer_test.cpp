@@ -47,7 +47,7 @@ TEST(PixelRays, PixelsOutsideTheLensAreDarkAndTheOthersDoNotKnowThem) {
       dark += outside ? 1 : 0;
       ASSERT_EQ(std::isnan(renderer.rays()(x, y).ray.x()), outside) << x << ", " << y;
       ASSERT_EQ(frame.surface(y, x), outside ? -1 : 0);
-      // The wall is brighter, up to the last pixel inside.
+      // The wall is brighter in every pixel inside its border.
       ASSERT_EQ(frame.log_intensity(y, x), outside ? 0.0F : 1.0F) << x << ", " << y;
     }
   }
@@ -66,7 +66,7 @@ TEST(DepthRendering, OfAGroundPlaneFollowsTheHyperbola) {
   // The ground 1.2 m below the camera (y = 1.2), seen from above: z = 1.2 f / (y - cy).
   scene.addRectangle({{-50, 1.2, 0}, {1, 0, 0}, {0, 0, 1}, 100, 100}, test::evenPaint(0));
   const ReferenceView view = ReferenceView::of(test::smallCamera().model);
-  // From 3 m to the right and 2 m ahead, turned about the vertical.
+  // The camera is 3 m to the right and 2 m ahead, rotated about the vertical.
   const Rigid3 T_world_cam{rotationBy({0, 0.3, 0}), {3, 0, 2}};
   const cv::Mat1f depth = renderDepth(scene, T_world_cam, view);
   ASSERT_EQ(depth.size(), cv::Size(64, 48));

@@ -16,7 +16,7 @@
 namespace efm {
 namespace {
 
-/// An edge at u = 1 m, from 0 to 1, on a painting of 2 m x 2 m.
+/// Returns an edge at u = 1 m, from 0 to 1, on a texture of 2 m x 2 m.
 Texture makeEdge(double texel_m) {
   const int texels = static_cast<int>(std::lround(2 / texel_m));
   cv::Mat1f painting(texels, texels, 0.0F);
@@ -111,7 +111,7 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
   RandomNumbers random(3);
   const double apothem = 0.1 * std::cos(M_PI / 8);
   for (int i = 0; i < 500; ++i) {
-    // Across: a horizontal ray at the axis meets the side between the apothem and the corner.
+    // A horizontal ray towards the axis meets the side between the apothem and the corner.
     const double angle = random.uniform(0, 2 * M_PI);
     const Eigen::Vector3d out_pole(std::cos(angle), std::sin(angle), 0);
     const Eigen::Vector3d on_axis_pole(0, 0, random.uniform(-0.999, 0.999));
@@ -120,7 +120,7 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
     ASSERT_TRUE(side.has_value());
     EXPECT_GE(5 - side->distance_m, apothem - 1e-9);
     EXPECT_LE(5 - side->distance_m, 0.1 + 1e-9);
-    // Along: an end is closed everywhere inside the polygon.
+    // A ray along the axis meets the end everywhere inside the polygon.
     const Eigen::Vector3d inside_pole = random.uniform(0, 0.999 * apothem) * out_pole;
     const double end = random.below(2) == 0 ? -1 : 1;
     const Eigen::Vector3d along_world = T_world_pole.rotation * Eigen::Vector3d(0, 0, end);

@@ -27,7 +27,7 @@ TEST(EventNoise, EveryPixelFiresAtTheBackgroundRateWithHalfOfEachPolarity) {
   options.background_hz = 5;
   EventNoise noise(40, 30, options, {1, kSecondNs});
   const auto events = fireAll(noise, 30, 3 * kSecondNs);
-  // 12000 expected. The stddev of a Poisson number is its root, 110.
+  // 12000 events are expected. The stddev of a Poisson number is its root, 110.
   EXPECT_NEAR(static_cast<double>(events.size()), 12'000, 450);
   int on = 0;
   std::map<std::pair<int, int>, int> per_pixel;
@@ -101,7 +101,7 @@ TEST_F(OnePixel, RemembersItsLastEventAcrossSteps) {
   const auto brighter = step({10'000'000, 20'000'000}, 1.15F, 1.35F);
   ASSERT_EQ(brighter.size(), 1U);
   EXPECT_EQ(brighter[0].t_ns, 12'500'000);
-  // Back to 1.0: one threshold below 1.2, reached at the very end.
+  // One threshold below 1.2 is 1.0: the step reaches it at the very end.
   const auto darker = step({20'000'000, 30'000'000}, 1.35F, 0.999F);
   ASSERT_EQ(darker.size(), 1U);
   EXPECT_FALSE(darker[0].polarity);
@@ -177,7 +177,7 @@ TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
       ++counts[static_cast<std::size_t>(event.y * 60 + event.x)];
     return counts;
   };
-  // A pixel fires 10 / threshold times: its threshold is 10 / count, to 1 %.
+  // A pixel fires 10 / threshold times. Its threshold is 10 / count with an error of 1 %.
   double sum = 0;
   double squares = 0;
   for (const double count : counts_of(3)) {
@@ -213,8 +213,8 @@ constexpr double kDepth = 1.0;     // metres
 constexpr float kContrast = 1.0F;  // log intensity
 constexpr double kThreshold = 0.15;
 
-/// A camera moves to the right past an upright edge at x = 0: in the image the edge moves to the
-/// left at f v / z = 15 pixels per second, through cx at t = 0.
+/// Returns a camera that moves to the right past an upright edge at x = 0. In the image the edge
+/// moves to the left at f v / z = 15 pixels per second and is at cx at t = 0.
 Simulation passingEdge() {
   Simulation simulation;
   simulation.scene.addRectangle(test::facingWall(kDepth, 4, 4),
@@ -244,12 +244,12 @@ TEST(SimulatedRig, AMovingEdgeFiresAtItsPositionAndTime) {
   for (const Event& event : events) {
     const double edge_x =
         model.cx - model.fx * kSpeed / kDepth * (static_cast<double>(event.t_ns) * 1e-9);
-    // With a blur of half a pixel, the edge has an effect up to two pixels away.
+    // The edge has an effect up to two pixels away, because of a blur of half a pixel.
     EXPECT_NEAR(event.x, edge_x, 2.5);
-    EXPECT_TRUE(event.polarity);  // the bright side enters
+    EXPECT_TRUE(event.polarity);  // the bright side enters the pixel
     sum_px += event.x - edge_x;
   }
-  // The mean is the edge, except for the lag of a threshold.
+  // The mean position is the edge, except for the lag of a threshold.
   EXPECT_NEAR(sum_px / static_cast<double>(recordings[0].events.size()), 0, 0.1);
 }
 
@@ -258,8 +258,8 @@ TEST(SimulatedRig, EveryPixelOnThePathOfTheEdgeFiresContrastOverThreshold) {
   std::map<int, int> per_column;
   const auto recordings = simulateEvents(simulation);
   for (const Event& event : recordings[0].events) ++per_column[event.x];
-  // From t = -1 s to 1 s the edge passes the columns 46.5 to 16.5. Well within them each pixel sees
-  // the whole contrast. The remainder below a threshold fires no event. Its mean is half a
+  // From t = -1 s to 1 s the edge passes the columns 46.5 to 16.5. Pixels well inside these columns
+  // see the whole contrast. The remainder below a threshold fires no event. Its mean is half a
   // threshold, because the memory at the start is random.
   for (int x = 20; x <= 43; ++x) {
     const double mean = per_column[x] / 48.0;
@@ -352,7 +352,7 @@ TEST(SimulatedRig, AnEdgeFiresOnItsDistortedImage) {
         nearest_px = std::min(
             nearest_px, (camera.model.project(p_cam) - Eigen::Vector2d(event.x, event.y)).norm());
       }
-      // The blur has an effect two pixels away, and more where a pixel starts close to its
+      // The blur has an effect two pixels away, and farther if a pixel starts close to its
       // threshold.
       ASSERT_LT(nearest_px, 5);
       sum_px += nearest_px;

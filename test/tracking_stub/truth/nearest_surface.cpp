@@ -16,7 +16,7 @@ std::optional<RayHit> castRay(const Scene& scene, const Eigen::Vector3d& origin,
     const Eigen::Vector3d normal = r.normal();
     const double approach = -normal.dot(unit);
     const double height = normal.dot(origin - r.corner);
-    if (!(approach > 0) || !(height > 0)) continue;  // parallel, or from behind
+    if (!(approach > 0) || !(height > 0)) continue;  // parallel or from behind
     const double distance = height / approach;
     if (nearest && nearest->distance_m <= distance) continue;
     const Eigen::Vector3d p_world = origin + distance * unit;
