@@ -41,9 +41,9 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
     Eigen::Vector3f origin;
   };
   const Case cases[] = {
-      {{8191, -8191, 5}, 0.01, {0, 0, 0}},  // a float's step there: 0.5 mm, from 8192 m on 1 mm
+      {{8191, -8191, 5}, 0.01, {0, 0, 0}},  // float step: 0.5 mm, from 8192 m on 1 mm
       {{16383, 0, 0}, 0.01, {0, 0, 0}},
-      {{16385, 0, 499}, 0.01, {16000, 0, 0}},  // 2 mm
+      {{16385, 0, 499}, 0.01, {16000, 0, 0}},  // float step: 2 mm
       {{450'123.4, 5'400'456.7, 100}, 0.01, {450'000, 5'400'000, 0}},
       {{-450'623.4, 5'400'456.7, -600}, 0.01, {-451'000, 5'400'000, -1000}},
       {{450'123.4, 5'400'456.7, 100}, 0.001, {450'100, 5'400'500, 100}},
@@ -61,7 +61,7 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
     EXPECT_EQ(cloud->at(0).sigma, 0.5F);
     const auto step_m = coarseStepOf(*cloud, far.resolution_m);
     EXPECT_EQ(step_m.has_value(), !far.origin.isZero());
-    // Floats of 24 bits: of 16385 in steps of 2^(14 - 23).
+    // Floats have 24 bits: the step at 16385 is 2^(14 - 23).
     if (far.p_world.x() == 16385) {
       EXPECT_EQ(step_m, std::ldexp(1, -9));
     }
@@ -85,7 +85,7 @@ TEST(MapCloud, APointFarFromTheOthersDoesNotMoveTheOrigin) {
 
 using testing::ElementsAre;
 
-/// Points on the x axis, numbered by their confidence from 1 on.
+/// Returns points on the x axis. Their confidences are numbers from 1 on.
 std::vector<CloudPoint> onALine(const std::vector<double>& xs) {
   std::vector<CloudPoint> points;
   points.reserve(xs.size());
@@ -100,7 +100,7 @@ std::vector<float> numbers(const std::vector<CloudPoint>& points) {
   return numbers;
 }
 
-/// Points on a lattice of eighths of a metre, which float has exactly, in a box around `middle`.
+/// Draws points in a box around `middle`, on a lattice of 1/8 m (exact in float).
 std::vector<CloudPoint> latticePoints(std::mt19937& random, int count,
                                       const Eigen::Vector3d& middle, int radius) {
   std::uniform_int_distribution<int> eighths(-radius, radius);
@@ -116,7 +116,7 @@ std::vector<float> survivorsByBruteForce(const std::vector<CloudPoint>& points,
                                          const OutlierRemovalOptions& options) {
   std::vector<float> survivors;
   for (const CloudPoint& point : points) {
-    // Itself is among those within the radius.
+    // The point itself is within the radius.
     const auto within = std::count_if(points.begin(), points.end(), [&](const CloudPoint& other) {
       return (other.p_world - point.p_world).norm() <= options.outlier_radius_m;
     });
@@ -131,14 +131,14 @@ RC_GTEST_PROP(RemoveOutliers, KeepsWhatBruteForceKeepsAtAnyDistanceFromTheOrigin
   const std::vector<CloudPoint> points = latticePoints(
       random, *rc::gen::inRange(0, 400), {middle, -middle, middle}, *rc::gen::element(4, 16, 64));
   OutlierRemovalOptions options;
-  options.outlier_radius_m = *rc::gen::element(0.125, 0.5, 1.0, 3.0);  // neighbours on the radius
+  options.outlier_radius_m = *rc::gen::element(0.125, 0.5, 1.0, 3.0);  // some on the radius
   options.outlier_min_neighbors = *rc::gen::inRange(1, 12);
 
   RC_ASSERT(numbers(removeOutliers(points, options)) == survivorsByBruteForce(points, options));
 }
 
 TEST(RemoveOutliers, AFarOutlierDoesNotReduceThePrecisionOfTheOthers) {
-  // From the middle of the bounds, 5e8 m away, floats would be 32 m apart.
+  // Floats relative to the middle of the bounds, 5e8 m away, would have steps of 32 m.
   const std::vector<CloudPoint> points = onALine({0, 0.01, 0.02, 0.03, 0.5, 1e9});
 
   EXPECT_THAT(numbers(removeOutliers(points, {0.015, 1})), ElementsAre(1, 2, 3, 4));
@@ -146,7 +146,7 @@ TEST(RemoveOutliers, AFarOutlierDoesNotReduceThePrecisionOfTheOthers) {
 }
 
 TEST(RemoveOutliers, PointsThatAreNotFiniteAreRejected) {
-  // The square of 1e18 is a float's, that of 1e20 is not.
+  // The square of 1e18 fits a float; the square of 1e20 does not.
   for (const double wrong : {std::nan(""), 1.0 * INFINITY, 1e18, -1e30}) {
     EXPECT_THROW(removeOutliers(onALine({0, 0, wrong}), {1, 1}), std::invalid_argument) << wrong;
   }
@@ -161,7 +161,7 @@ ConsistencyOptions options() {
 }
 
 TEST(VisibilityGrid, HiddenAndUnseenPointsAreUnknown) {
-  std::vector<CloudPoint> wall;  // x and y from -1 to 1 m: every half degree and denser
+  std::vector<CloudPoint> wall;  // x and y from -1 to 1 m, spacing of half a degree or less
   for (int y = -100; y <= 100; ++y) {
     for (int x = -100; x <= 100; ++x) wall.push_back({{0.01 * x, 0.01 * y, 2}, 1.0F});
   }
@@ -177,7 +177,7 @@ TEST(VisibilityGrid, HiddenAndUnseenPointsAreUnknown) {
   EXPECT_EQ(verdict_of({0, 0, 2}, {0, 0, 1}), Verdict::kUnknown) << "a single cell behind";
   EXPECT_EQ(verdict_of({0, 0, -1}, {0, 0, -1}), Verdict::kUnknown) << "a point behind the view";
   EXPECT_EQ(VisibilityGrid({}, {}, options()).verdictOn({0, 0, 1}), Verdict::kUnknown);
-  // Up to 20 times its depth to the side a point is in view.
+  // A point is in view up to 20 times its depth to the side.
   for (const double sign : {-1.0, 1.0}) {
     for (const Eigen::Vector3d& side : {Eigen::Vector3d(sign, 0, 0), Eigen::Vector3d(0, sign, 0)}) {
       const Eigen::Vector3d inside = 19.9 * side + Eigen::Vector3d::UnitZ();
@@ -198,7 +198,7 @@ RC_GTEST_PROP(VisibilityGrid, DecidesLikeBruteForce, ()) {
   };
   std::vector<CloudPoint> points;
   for (int i = 0; i < *rc::gen::inRange(1, 200); ++i) points.push_back({draw(), 1.0F});
-  // Rotated by right angles and moved by whole metres.
+  // The view is rotated by right angles and moved by whole metres.
   const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {16, -8, 4}};
   std::vector<CloudPoint> in_world = points;
   for (CloudPoint& point : in_world) point.p_world = T_world_ref * point.p_world;

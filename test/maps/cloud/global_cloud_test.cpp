@@ -56,7 +56,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
     double weight = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     int count = 0;
-    std::map<std::size_t, double> sigmas;  // per keyframe, weighted
+    std::map<std::size_t, double> sigmas;  // weighted, per keyframe
   };
   std::map<std::array<long, 3>, Mean> means;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
@@ -76,16 +76,15 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
 
   const std::vector<CloudPoint> points = test::worldPoints(*cloud.points());
   RC_ASSERT(points.size() == means.size());
-  // Far away the cloud's floats have steps of a tenth of a voxel at most: off by half of it per
-  // axis.
+  // The float steps of a far cloud are at most a tenth of a voxel: errors are half a step per axis.
   const double tolerance_m = far_m > 0 ? 0.09 * voxel_m : 1e-6;
   std::size_t i = 0;
-  for (const auto& [index, mean] : means) {  // sorted by index, as the export is
+  for (const auto& [index, mean] : means) {  // sorted by index like the export
     RC_ASSERT((points[i].p_world - mean.p / mean.weight).norm() < tolerance_m);
     RC_ASSERT(std::abs(points[i].confidence - mean.weight / mean.count) < 1e-5);
     RC_ASSERT(points[i].support == mean.sigmas.size());
     RC_ASSERT(points[i].first_keyframe == mean.sigmas.begin()->first);
-    double squares = 0;  // common within a keyframe, independent between keyframes
+    double squares = 0;  // errors are common within a keyframe only
     for (const auto& [keyframe, sigma] : mean.sigmas) squares += sigma * sigma;
     RC_ASSERT(std::abs(points[i].sigma - std::sqrt(squares) / mean.weight) < 1e-6);
     ++i;
@@ -94,7 +93,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
 
 RC_GTEST_PROP(GlobalCloud, DependsOnItsKeyframesAloneBitForBit, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  std::uniform_int_distribution<std::uint64_t> number(0, 11);  // some do not check each other
+  std::uniform_int_distribution<std::uint64_t> number(0, 11);  // some pairs are not compared
   std::uniform_int_distribution<int> count(0, 120);
   const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {-1, 0, 0}};
   GlobalCloud cloud({0.4, 2});
@@ -143,7 +142,7 @@ TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoint
 }
 
 TEST(GlobalCloud, ARejectedKeyframeLeavesNothingBehind) {
-  const double limit = std::ldexp(1, 60);  // of indices of 64 bits, where a voxel has 1/8 m
+  const double limit = std::ldexp(1, 60);  // limit of 64-bit indices of 1/8 m voxels
   const double above = std::nextafter(limit, INFINITY);
   const double below = std::nextafter(limit, 0);
   GlobalCloud cloud({0.125, 1});
@@ -197,8 +196,8 @@ GlobalCloudOptions withConsistency(Consistency consistency) {
 
 Rigid3 viewAt(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
 
-/// The view of a wall at z = 3 m. Each point is off along its ray by a random fraction of its
-/// inverse depth, up to `noise`.
+/// Draws the points of a wall at z = 3 m. The inverse depth of each point has a random relative
+/// error of up to `noise`.
 std::vector<CloudPoint> wallSeenFrom(const Rigid3& T_world_ref, double noise,
                                      std::mt19937& random) {
   std::uniform_real_distribution<double> error(-noise, noise);
@@ -213,7 +212,7 @@ std::vector<CloudPoint> wallSeenFrom(const Rigid3& T_world_ref, double noise,
   return points;
 }
 
-/// Adjacent views. One of 50 points lies in front of the wall.
+/// Draws adjacent views. One point of 50 lies in front of the wall.
 std::vector<View> viewsWithOutliers(std::mt19937& random, int count) {
   std::uniform_real_distribution<double> wrong(1.2, 2.2);
   std::vector<View> views;
@@ -349,7 +348,7 @@ TEST(MapConsistency, FinalizedKeyframesMakeTheSameMapBitForBit) {
     for (std::uint64_t k = 0; k < views.size(); ++k) {
       kept.insert(k, views[k].points, views[k].T_world_ref);
       finalized.insert(k, views[k].points, views[k].T_world_ref);
-      // At any time, one keyframe or several at once.
+      // Keyframes are finalized at any time, one or several at once.
       if (k >= GlobalCloud::kMaxNumberDifference && random() % 3 == 0) {
         finalized.finalize(k - GlobalCloud::kMaxNumberDifference);
       }
@@ -362,8 +361,8 @@ TEST(MapConsistency, FinalizedKeyframesMakeTheSameMapBitForBit) {
     EXPECT_GT(finalized.finalizedVoxels(), 0U);
     EXPECT_LT(finalized.unfinalizedVoxels(kAll), kept.unfinalizedVoxels(kAll) / 2);
     EXPECT_EQ(finalized.unfinalizedVoxels(0), 0U);
-    finalized.finalize(31);  // the limits of what may change from now on
-    finalized.finalize(5);   // which do not become wider again
+    finalized.finalize(31);  // only keyframes from 31 on may change
+    finalized.finalize(5);   // a smaller number changes nothing
     EXPECT_THROW(finalized.insert(38, {}), std::invalid_argument);
     EXPECT_THROW(finalized.remove(30), std::invalid_argument);
     EXPECT_THROW(finalized.replace(30, {}, {}), std::invalid_argument);

@@ -16,7 +16,7 @@ namespace {
 
 using test::drawMotion;
 
-/// A view of 3 x 2 pixels, f = 2, principal point (1, 0), without any depth.
+/// Returns a view of 3 x 2 pixels, f = 2, principal point (1, 0), without depths.
 KeyframeDepthMap smallKeyframe() {
   KeyframeDepthMap keyframe;
   keyframe.view = {3, 2, 2.0, 2.0, 1.0, 0.0};
@@ -31,7 +31,7 @@ TEST(KeyframeCloud, PointOfAPixelIsWorkedOutByHand) {
   keyframe.map.confidence(1, 2) = 7.0F;
   keyframe.map.variance = cv::Mat1f::ones(2, 3);
   keyframe.map.variance(1, 2) = 0.0025F;  // sigma of depth: 4^2 * sqrt(0.0025) = 0.8
-  // Quarter turn about z: (x, y, z) -> (-y, x, z); then a step of (10, 20, 30).
+  // Rotation by 90 deg about z: (x, y, z) -> (-y, x, z). Then a translation of (10, 20, 30).
   keyframe.T_world_ref.rotation = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
   keyframe.T_world_ref.translation = {10, 20, 30};
 
@@ -85,7 +85,7 @@ TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRejected) {
   }
 }
 
-/// Points in front of a view, on a surface that all views share.
+/// Draws points in front of a view, on a surface that all views share.
 std::vector<ViewPoint> randomPoints(std::mt19937& random, std::size_t count) {
   std::uniform_real_distribution<float> uniform(-1, 1);
   std::vector<ViewPoint> points;
@@ -106,7 +106,7 @@ GlobalCloudOptions optionsOf(Consistency consistency) {
   return options;
 }
 
-/// Keyframes, and a new map of them.
+/// Keyframes with their poses, of which a new map can be made.
 struct PosedKeyframes {
   std::vector<std::vector<ViewPoint>> points;
   std::vector<Rigid3> T_world_ref;
@@ -150,7 +150,7 @@ RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
     } else {
       cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
     }
-    // The map has the poses that it states, pending or not.
+    // The map is made with the poses that it returns, also if other poses are pending.
     for (std::size_t i = 0; i < keyframes.points.size() - fixed; ++i) {
       keyframes.T_world_ref[fixed + i] = cloud.T_world_ref()[i];
     }
@@ -170,7 +170,7 @@ TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
   for (int i = 0; i < 2; ++i) cloud.insert({{{0, 0, 2}, 1}, {{0, 0, 4}, 1}}, {});
   Rigid3 T_shifted;
   T_shifted.translation = {0.003, 0, 0};
-  Rigid3 T_rotated;  // 4 m away: 0.004 m
+  Rigid3 T_rotated;  // 0.004 m at 4 m
   T_rotated.rotation = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY());
   cloud.move({{0, T_shifted}});
   cloud.move({{1, T_rotated}});
@@ -247,22 +247,22 @@ TEST(RefinedCloud, RejectsToMoveWhatItDoesNotHaveOrHold) {
 TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
   std::mt19937 random(5);
   GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
-  options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them finalize
+  options.voxel_size_m = 0.001;  // almost one voxel per point: enough to finalize
   constexpr std::size_t kMovable = 3;
   RefinedCloud cloud(options, kMovable);
   cloud.insertFixed({}, {});
   PosedKeyframes keyframes;
   std::size_t stayed = 0;
   for (std::size_t k = 0; k < 32; ++k) {
-    // Five keyframes make the 200,000 voxels that are worth a merge.
+    // Five keyframes make 200,000 voxels, which trigger a merge.
     keyframes.points.push_back(randomPoints(random, k % 12 < 5 ? 42'000 : 500));
     cloud.insert(keyframes.points.back(), drawMotion(0.1, 0.1, random));
-    // The newest one, the oldest that may move, and some of all.
+    // The newest keyframe, the oldest one that may move, and random keyframes are moved.
     std::map<std::size_t, Rigid3> moves{{k, drawMotion(0.1, 0.1, random)}};
     if (k >= kMovable) moves[k - kMovable] = drawMotion(0.1, 0.1, random);
     for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = drawMotion(0.1, 0.1, random);
     cloud.move(moves);
-    if (k % 3 != 2) continue;  // others stay pending while keyframes are finalized
+    if (k % 3 != 2) continue;  // other moves stay pending meanwhile
     cloud.applyPending(0);
     for (const auto& [keyframe, T_world_ref] : moves) {
       const bool moved = isSame(cloud.T_world_ref()[keyframe], T_world_ref);

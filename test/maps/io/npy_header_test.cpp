@@ -11,7 +11,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A file with this dictionary before its data.
+/// Returns the header of a file with this dictionary.
 std::string npy(const std::string& dictionary, char version = 1) {
   std::string length(version == 1 ? 2 : 4, '\0');
   length[0] = static_cast<char>(dictionary.size() % 256);
@@ -65,7 +65,7 @@ TEST(NpyHeader, HasTheNumbersOfAStructureAndWhereTheyStand) {
     fields.push_back(field.name + " " + std::to_string(field.offset) +
                      (field.big_endian ? " big" : ""));
   }
-  // 8 of t, 12 of xy, 3; 2 of p, twice 9 of in, 8 of name; 1, 8, 1.
+  // Bytes: 8 (t), 12 (xy), 3 (padding), 2 (p), 2 * 9 (in), 8 (name), 1 (one), 8 (when), 1 (q).
   EXPECT_THAT(fields, ElementsAre("t 0", "p 23 big", "one 51", "q 60"));
   EXPECT_EQ(header.fields[0].type, NumberType::kFloat64);
   EXPECT_EQ(header.fields[1].type, NumberType::kInt16);
@@ -86,7 +86,7 @@ TEST(NpyHeader, HasItsShapeAndTheBeginOfTheDataInEachVersion) {
                          {"(0, 7)", {0, 7}, 0},
                          {"(9007199254740992,)", {kMost}, kMost}}) {
     for (const char version : {1, 2, 3}) {
-      // Any blanks, and longer than a byte can say.
+      // Blanks are anywhere, and the length does not fit into one byte.
       const std::string text = "{'shape' : " + of.shape + ",'fortran_order':True, 'descr':'<f4'}" +
                                std::string(300, ' ') + "\n";
       const NpyHeader header = parseNpyHeader(npy(text, version) + "data");

@@ -38,7 +38,7 @@ PointCloudContent parse(const std::filesystem::path& name, const std::string& by
   return name.extension() == ".ply" ? parsePly(bytes) : parsePcd(bytes);
 }
 
-/// The bytes of a number, in the order of this machine or the other.
+/// Returns the bytes of a number in this machine's or in the opposite order.
 template <typename Number>
 std::string raw(Number number, bool swapped = false) {
   std::string bytes(sizeof(number), '\0');
@@ -58,7 +58,7 @@ std::vector<CloudPoint> plainPoints(int count) {
   return points;
 }
 
-/// LZF without compression: runs of up to 32 bytes, each after its length minus 1.
+/// Returns LZF without compression: runs of up to 32 bytes, each after its length minus 1.
 std::string asLzf(const std::string& bytes) {
   std::string packed;
   for (std::size_t i = 0; i < bytes.size(); i += 32) {
@@ -68,8 +68,8 @@ std::string asLzf(const std::string& bytes) {
   return packed;
 }
 
-/// The same points as a file of each format and encoding: names and bytes. All but the first have
-/// the fields of maps before they had support and sigma.
+/// Returns names and bytes of files with the same points, one per format and encoding. All files
+/// but the first have the fields of older maps, without support and sigma.
 std::vector<std::pair<std::string, std::string>> filesOf(const std::vector<CloudPoint>& points) {
   std::ostringstream pcd;
   writePcdTo(pcd, *mapCloudOf(points, 1e9));
@@ -126,7 +126,7 @@ TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
   const PointCloudContent content = readPointCloud(folder() / "map.ply");
   ASSERT_EQ(content.points.size(), 2U);
   for (int i = 0; i < 2; ++i) EXPECT_EQ(content.points[i].p_world, points[i].p_world);
-  // The last bytes of a vertex, which the reader leaves out.
+  // The reader ignores the last bytes of a vertex.
   const std::string bytes = readBytes(folder() / "map.ply");
   EXPECT_THAT(bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
                                      "\nproperty float confidence\nproperty uint support\n"),
@@ -154,13 +154,13 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
   expectNear(readPointCloud(folder() / "a.pcd").points, points, 1e-6);
   expectNear(readPointCloud(folder() / "a.ply").points, points, 1e-6);
   expectNear(readPointCloud(folder() / "b.ply").points, points, 0);
-  // Their filters keep the fields: the mean of the points of a voxel, support as they count it.
+  // The PCL filters keep the fields: means of the points of a voxel, and PCL's own support.
   ASSERT_EQ(runInFolder("pcl_voxel_grid map.pcd v.pcd -leaf 5,5,5"), 0);
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary v.pcd va.pcd 0"), 0);
   EXPECT_LT(readPointCloud(folder() / "va.pcd").points.size(), 200U);
   EXPECT_THAT(readBytes(folder() / "va.pcd"),
               AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"), HasSubstr(" 1 0.25\n")));
-  // This program pads the compressed file to a whole page.
+  // pcl_convert_pcd_ascii_binary pads the compressed file to a whole page.
   std::string bytes = readBytes(folder() / "c.pcd");
   const std::size_t sizes = bytes.find("compressed\n") + 11;
   std::uint32_t packed_bytes = 0;
@@ -169,7 +169,7 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
              0);
 }
 
-/// With poses in UTM coordinates: a float has steps of 0.5 m at 5,400,000 m.
+/// Poses in UTM coordinates: a float has steps of 0.5 m at 5,400,000 m.
 TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> offset_m(-2.5, 2.5);
@@ -185,7 +185,7 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
       heights.insert(read[i].p_world.y());
       ASSERT_LT((read[i].p_world - points[i].p_world).norm(), tolerance_m) << name;
     }
-    EXPECT_GT(heights.size(), 4000U) << name;  // of floats in the world: 11
+    EXPECT_GT(heights.size(), 4000U) << name;  // floats in the world: 11
   };
   writePcd(folder() / "map.pcd", *mapCloudOf(points, 0.01));
   expectAllDigits("map.pcd", 1e-4);
@@ -203,7 +203,7 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
   expectAllDigits("oa.pcd", 1e-3);
 }
 
-/// The place of a sensor, whose points may be relative to anything.
+/// Other programs store the pose of a sensor there. Their points may be relative to any frame.
 TEST_F(PointCloudFile, ViewpointsOfOtherProgramsAreNotAdded) {
   const std::string start = "VERSION 0.7\nFIELDS x y z";
   const std::string end = "WIDTH 1\nHEIGHT 1\nVIEWPOINT 10 20 30 1 0 0 0\nPOINTS 1\nDATA ascii\n";
@@ -321,7 +321,7 @@ TEST_F(PointCloudFile, OtherFieldsAndElementsAreIgnored) {
                    std::string(18, 'c') + "r" + raw(3.0F, true) + raw(std::int16_t{-7}, true) +
                    rawFloats({2, 1}, true) + "r" + raw(6.0F, true) + raw(std::int16_t{8}, true) +
                    rawFloats({5, 4}, true) + "faces");
-  // Points of four bytes of padding, x, a pair of shorts, y and z.
+  // A point has four bytes of padding, x, a pair of shorts, y and z.
   const PointCloudContent pcd =
       parse("c.pcd",
             "#by hand\n\nVERSION 0.7\nCOLUMNS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F "
@@ -474,7 +474,7 @@ TEST_F(PointCloudFile, ThatIsMalformedSaysWhereAndWhatWasExpected) {
   for (const auto& [bytes, expected] : of_pcd) {
     EXPECT_THAT(messageOf([&, &wrong = bytes] { parsePcd(wrong); }), HasSubstr(expected)) << bytes;
   }
-  // At the limits: the most numbers of a field, and no more bytes than elements need.
+  // Values at the limits: the most numbers per field, and exactly the bytes of the elements.
   EXPECT_NO_THROW(
       parsePcd("FIELDS x y z all\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 1048576\n"
                "POINTS 0\nDATA binary\n"));

@@ -14,7 +14,7 @@ namespace efm {
 namespace {
 
 TEST(SampleStatistics, AreWorkedOutByHand) {
-  // Sum 10, squares 1 + 1 + 4 + 36 = 42; differences from 2.5: 1.5^2 * 2 + 0.5^2 + 3.5^2 = 17.
+  // Sum: 10. Sum of squares: 1 + 1 + 4 + 36 = 42. Around 2.5: 1.5^2 * 2 + 0.5^2 + 3.5^2 = 17.
   const SampleStatistics statistics = statisticsOf({1, 6, 2, 1});
   EXPECT_EQ(statistics.count, 4U);
   EXPECT_DOUBLE_EQ(statistics.mean, 2.5);
@@ -61,13 +61,13 @@ Points drawPoints() {
 }
 
 TEST(CloudErrors, AreWorkedOutByHand) {
-  // On a line: the map at 0, 1 and 5, the truth at 0, 1.5, 2 and 2.5.
+  // The points are on a line: the map at 0, 1 and 5, the truth at 0, 1.5, 2 and 2.5.
   const Points map = pointsAt({{0, 0, 0}, {1, 0, 0}, {5, 0, 0}});
   const Points truth = pointsAt({{0, 0, 0}, {1.5, 0, 0}, {2, 0, 0}, {2.5, 0, 0}});
 
   const CloudErrors errors = cloudErrors(map, truth, {0.5, 1, 3});
 
-  // Map to truth 0, 0.5, 2.5; truth to map 0, 0.5, 1, 1.5.
+  // Distances from map to truth: 0, 0.5, 2.5. From truth to map: 0, 0.5, 1, 1.5.
   EXPECT_DOUBLE_EQ(errors.accuracy.mean, 1);
   EXPECT_DOUBLE_EQ(errors.accuracy.median, 0.5);
   EXPECT_DOUBLE_EQ(errors.accuracy_p90_m, 2.5);

@@ -32,8 +32,8 @@ TEST(PairDepths, TruthFartherThanTheLimitCountsAsNone) {
 }
 
 TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
-  // Around the pixel: 1 m and 4 m. |1/2 - 1/1| = 0.5, |1/2 - 1/4| = 0.25, although 1 m is the
-  // nearer one in depth. 3 m is at the end of the row before.
+  // The neighbours of the pixel (2 m) are 1 m and 4 m. 4 m is closer in inverse depth: |1/2 - 1/1|
+  // = 0.5, |1/2 - 1/4| = 0.25. 3 m is at the end of the previous row.
   const cv::Mat1f estimate = (cv::Mat1f(2, 3) << 0, 0, 0, 2, 0, 0);
   const cv::Mat1f truth = (cv::Mat1f(2, 3) << 1, 0, 3, 9, 4, 0);
 
@@ -58,7 +58,7 @@ TEST(PairDepths, AMaskLeavesOutEstimatesAndTruths) {
   EXPECT_THROW(pairDepths(depths), std::invalid_argument);
 }
 
-/// All of them.
+/// Returns all errors.
 std::vector<double> valuesOf(const DepthErrors& e) {
   return {e.mean_abs_m,     e.median_abs_m,
           e.median_inverse, e.bad_pix_5px.value_or(-1),
@@ -85,7 +85,7 @@ TEST(DepthErrors, AreWorkedOutByHand) {
                                     (1 + 0.5 + 1.5) / 4, (0.5 + 1 + 0.6) / 4,
                                     100 * std::sqrt(squares), 0.25, 0.25, 0.25, 0.75});
   expectMeasures(valuesOf(depthErrors({}, 100.0)), std::vector<double>(13, 0.0));
-  // A tenth is not beyond a tenth.
+  // An error of exactly a tenth is not beyond a tenth.
   EXPECT_EQ(depthErrors({{2.25, 2.5}, {2.75, 2.5}, {8, 10}}).beyond_tenth, 1.0 / 3);
 }
 
@@ -115,7 +115,7 @@ TEST(DepthErrors, BadPixelsExceedTheLimitInPixelsAndFivePercent) {
 
   EXPECT_DOUBLE_EQ(errors.bad_pix_5px.value(), 0.25);
   EXPECT_DOUBLE_EQ(errors.bad_pix_3px.value(), 0.5);
-  // At the limits a pixel is good: 69 px for 64, and 168 px for 160, which is 5 % more.
+  // A pixel at a limit is good: 69 px for 64 px, and 168 px for 160 px (5 % more).
   EXPECT_EQ(depthErrors({{64, 69}}, 64.0 * 69).bad_pix_5px.value(), 0);
   EXPECT_EQ(depthErrors({{160, 168}}, 160.0 * 168).bad_pix_5px.value(), 0);
   EXPECT_THROW(depthErrors({{1, 1}}, 0.0), std::invalid_argument);
@@ -123,7 +123,7 @@ TEST(DepthErrors, BadPixelsExceedTheLimitInPixelsAndFivePercent) {
 }
 
 TEST(DepthErrors, DeltaCountsRatiosUnderPowersOfFiveFourths) {
-  // Ratios, either way up: 1.2, 1.25 (not under 1.25), 1.5, 1.9, 2.
+  // Ratios of the larger to the smaller depth: 1.2, 1.25 (not under 1.25), 1.5, 1.9, 2.
   const DepthErrors errors = depthErrors({{1.2, 1}, {1, 1.25}, {1.5, 1}, {1, 1.9}, {2, 1}});
   EXPECT_DOUBLE_EQ(errors.delta[0], 1.0 / 5);
   EXPECT_DOUBLE_EQ(errors.delta[1], 3.0 / 5);
@@ -132,7 +132,7 @@ TEST(DepthErrors, DeltaCountsRatiosUnderPowersOfFiveFourths) {
 
 TEST(PrecisionRecall, AreWorkedOutByHand) {
   ComparedDepths depths;
-  // Errors 0.5, 0.25, none (no estimate), none (no truth), 2.
+  // Errors: 0.5, 0.25, none (no estimate), none (no truth), 2.
   depths.estimate = (cv::Mat1f(1, 6) << 1.5, 2.25, 0, 4, 7, 0);
   depths.truth = (cv::Mat1f(1, 6) << 1, 2, 3, 0, 5, 6);
 
@@ -173,7 +173,7 @@ TEST(PrecisionRecall, ToleranceFindsTruthsAroundAnEstimate) {
   const PrecisionRecall tolerant = precisionRecall(depths, {0.5}, {1});
   EXPECT_EQ(tolerant.precision(0), 1);
   EXPECT_DOUBLE_EQ(tolerant.recall(0), 2.0 / 4) << "the first and the third of four";
-  // As far up and down, and to the edges of the picture.
+  // The tolerance is the same up and down, and ends at the edges of the image.
   depths = {cv::Mat1f::zeros(5, 5), cv::Mat1f(5, 5, 2.0F), {}};
   depths.estimate(2, 2) = depths.estimate(4, 4) = depths.estimate(0, 0) = 2;
   EXPECT_EQ(precisionRecall(depths, {0.5}, {1}).recall(0), 15.0 / 25);

@@ -11,7 +11,7 @@ namespace {
 using testing::ElementsAre;
 using testing::Pair;
 
-/// Poses at these milliseconds; x is the time, too.
+/// Returns poses at the times; x is the time in milliseconds, too.
 std::vector<StampedPose> posesAt(const std::vector<int>& times_ms) {
   std::vector<StampedPose> poses;
   for (const int t_ms : times_ms) {
@@ -20,7 +20,7 @@ std::vector<StampedPose> posesAt(const std::vector<int>& times_ms) {
   return poses;
 }
 
-/// The times of the paired estimates and truths.
+/// Returns the times of the paired estimates and truths.
 std::vector<std::pair<double, double>> paired(const std::vector<int>& estimate_ms,
                                               const std::vector<int>& truth_ms,
                                               double max_difference_s) {
@@ -94,7 +94,7 @@ TEST(AbsoluteErrors, AlignmentOfThreePointsIsWorkedOutByHand) {
 }
 
 TEST(AbsoluteErrors, AlignmentNeverScales) {
-  // Twice as large: the middle stays, the corners are off by their distances from it.
+  // The estimate is twice as large: corners are off by their distances from the middle.
   std::vector<PosePair> pairs;
   for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
     pairs.push_back(pair(pairs.size(), at(2 * x, 2 * y), at(x, y)));
@@ -122,7 +122,7 @@ TEST(AbsoluteErrors, TooFewPairsOrPositionsOnALineAreRejected) {
   };
   EXPECT_THROW(alignTrajectories(along(3), TrajectoryAlignment::kSe3), std::invalid_argument);
   EXPECT_THROW(alignTrajectories({}, TrajectoryAlignment::kNone), std::invalid_argument);
-  std::vector<PosePair> swapped = along(3);  // the estimate alone is a line
+  std::vector<PosePair> swapped = along(3);  // only the estimate is a line
   for (PosePair& one : swapped) std::swap(one.T_map_rig, one.T_world_rig);
   EXPECT_THROW(alignTrajectories(swapped, TrajectoryAlignment::kSe3), std::invalid_argument);
   EXPECT_EQ(alignTrajectories(swapped, TrajectoryAlignment::kNone).translation.norm(), 0);
@@ -132,7 +132,7 @@ TEST(AbsoluteErrors, TooFewPairsOrPositionsOnALineAreRejected) {
 }
 
 TEST(RelativeErrors, AreWorkedOutByHand) {
-  // The truth goes a metre per second; the estimate 1.1 m, and turns by 0.1 in its second step.
+  // The truth moves at 1 m/s, the estimate at 1.1 m/s with a turn by 0.1 rad in its second step.
   std::vector<PosePair> pairs;
   Rigid3 T_map_rig;
   for (int i = 0; i < 4; ++i) {
@@ -157,12 +157,12 @@ TEST(RelativeErrors, AreWorkedOutByHand) {
 TEST(RelativeErrors, TakeTheNearestOtherEndWithinAFifth) {
   std::vector<PosePair> pairs;
   for (const double x : {0.0, 0.9, 1.15, 2.0, 2.0, 3.5}) pairs.push_back(pair(x, at(x), at(x)));
-  // From 0: 0.9. From 0.9: 2.0, the first. From 1.15: 2.0. From both 2.0: nothing near 3.
+  // Ends: 0.9 for 0, the first 2.0 for 0.9, 2.0 for 1.15, none for both 2.0 (no pose near 3).
   EXPECT_EQ(relativeErrors(pairs, {Unit::kMetres, 1}).translation_m.size(), 3U);
   EXPECT_EQ(relativeErrors(pairs, {Unit::kSeconds, 1}).translation_m.size(), 3U);
   EXPECT_DOUBLE_EQ(trueLength(pairs), 3.5);
   EXPECT_EQ(trueLength({}), 0);
-  // Just within the limits, which do not belong to it, and of two equally near ends the earlier.
+  // Ends are just inside the (excluded) limits. Of two equally near ends the earlier is used.
   const auto errorsOver = [](const std::vector<double>& xs) {
     std::vector<PosePair> moved;
     for (const double x : xs) moved.push_back(pair(x, at(1.5 * x), at(x)));

@@ -19,7 +19,7 @@ using test::drawVector;
 using test::emptyKeyframe;
 using test::smallView;
 
-/// Samples from the model: a tracker with these errors, and points with 2 mm and 0.1 deg.
+/// Draws samples of a tracker with the errors `truth` and of registrations with 2 mm and 0.1 deg.
 std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double path_length_m,
                                       std::mt19937& random) {
   std::vector<MotionSample> samples;
@@ -47,16 +47,16 @@ TEST(TrackerErrors, CovariancesAreWorkedOutByHand) {
   Vector6d noise;
   noise << Eigen::Vector3d::Constant(9e-4 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
   EXPECT_LT((errors.noiseCovariance() - Matrix6d(noise.asDiagonal())).norm(), 1e-15);
-  Vector6d drift;  // a random walk: a quarter of a metre has half of a metre's standard deviation
+  Vector6d drift;  // random walk: sigma at 0.25 m is half the sigma at 1 m
   drift << Eigen::Vector3d::Constant(2.5e-5 + 1e-8), Eigen::Vector3d::Constant(6.25e-6 + 1e-10);
   EXPECT_LT((errors.driftCovariance(0.25) - Matrix6d(drift.asDiagonal())).norm(), 1e-15);
-  Vector6d far;  // always in one direction: 4 m have four times as much
+  Vector6d far;  // one direction: sigma at 4 m is 4 times the sigma at 1 m
   far << Eigen::Vector3d::Constant(1.6e-3 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
   EXPECT_LT((errors.driftCovariance(4) - Matrix6d(far.asDiagonal())).norm(), 1e-15);
 }
 
-/// The logarithm of the probability of errors, by the model that `estimateTrackerErrors` states:
-/// Student's t-distribution of 10 degrees of freedom, two samples as one, lognormal priors.
+/// Returns the log probability of errors under the model of `estimateTrackerErrors`: Student's
+/// t-distribution with 10 degrees of freedom, two samples count as one, lognormal priors.
 double logPosterior(const std::vector<MotionSample>& samples, const TrackerErrors& errors,
                     const TrackerErrors& expected) {
   double sum = 0;
@@ -94,7 +94,7 @@ TEST(EstimateTrackerErrors, IsAsLikelyAsItsNeighboursAtLeast) {
     const double best = logPosterior(samples, found, expected);
     EXPECT_GT(best, logPosterior(samples, expected, expected)) << seed;
     for (const auto field : kFields) {
-      for (const double change : {-0.25, 0.25}) {  // the last steps
+      for (const double change : {-0.25, 0.25}) {  // the last steps of the search
         TrackerErrors changed = found;
         changed.*field *= std::exp(change);
         EXPECT_LT(logPosterior(samples, changed, expected), best + 1e-9) << seed;
@@ -120,7 +120,7 @@ TEST(TrackerModel, ScalesStatedNoiseIsCautiousAndIncreasesItsDriftToALimit) {
   }
   EXPECT_EQ(model.errors().drift_m, 0.01);
 
-  // Exact motions: the estimate falls, but for registrations to a quarter at most.
+  // Exact motions reduce the estimate; registrations reduce it to a quarter at most.
   const auto keyframe = [] {
     return RefinedKeyframe{RegistrationCloud(emptyKeyframe(smallView()), {}), {}, {}, {}};
   };
@@ -170,8 +170,8 @@ using test::covarianceOf;
 using test::drawMotion;
 using test::metresApart;
 
-/// Keyframes without points on a circle of 10 m, with a tracker that drifts as it is expected to,
-/// and exact loops to the lap before.
+/// Keyframes without points on a circle of 10 m. The tracker drifts as expected. Loops to the
+/// previous lap are exact.
 struct Laps {
   static constexpr std::size_t kLap = 150;
 
@@ -246,7 +246,7 @@ TEST(SolveCondensed, LeavesFixedKeyframesAndStepsBetweenOthers) {
     if (i == 0) continue;
     const Rigid3 step = laps.graph.keyframes[i - 1].T_world_ref.inverse() * keyframe.T_world_ref;
     const Rigid3 step_was = before.graph.keyframes[i - 1].T_world_ref.inverse() * was.T_world_ref;
-    // A correction of metres is spread over hundreds of steps of 0.4 m.
+    // A correction of metres is distributed over hundreds of steps of 0.4 m.
     EXPECT_LT(metresApart(step, step_was), 0.02) << i;
   }
 }
@@ -295,8 +295,8 @@ TEST(KeyframeGraph, RanksKeyframesByOverlapAndByTheDistanceOfWhatTheySee) {
     graph.keyframes.push_back({RegistrationCloud(wall, {}), T_world_ref, T_world_ref, T_world_ref});
   }
   using Numbers = std::vector<std::size_t>;
-  // It sees (0, 0, -2), as keyframe 1 does from the other side.
-  // Of the newest one's 160 columns, 2 m away at 130 pixels, 1.8 m are 117 and 0.9 m are 59.
+  // The newest keyframe sees (0, 0, -2), as keyframe 1 does from the other side. 1.8 m are 117 and
+  // 0.9 m are 59 of its 160 columns (depth 2 m, focal length 130 px).
   EXPECT_EQ(graph.bestOverlaps({0, 1, 2, 3, 4}, 0.1, 9), (Numbers{1, 3, 4, 2}));
   EXPECT_EQ(graph.bestOverlaps({0, 1, 2, 3, 4}, 0.1, 2), (Numbers{1, 3}));
   EXPECT_EQ(graph.bestOverlaps({2, 4}, 0.4, 9), (Numbers{4}));

@@ -26,7 +26,7 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 using Poses = std::vector<Rigid3>;
 
-/// Fewer points than by default, for speed.
+/// Returns options with fewer points than by default, for speed.
 RefinementOptions quick() {
   RefinementOptions options;
   options.points.max_points = 300;
@@ -34,7 +34,7 @@ RefinementOptions quick() {
   return options;
 }
 
-/// On a circle, looking outwards, a keyframe every `step_deg`; 7 cm apart at 5 deg.
+/// Returns poses on a circle that look outwards, one every `step_deg`: 7 cm apart at 5 deg.
 Poses circle(int count, double step_deg) {
   Poses poses;
   for (int i = 0; i < count; ++i) {
@@ -45,7 +45,7 @@ Poses circle(int count, double step_deg) {
   return poses;
 }
 
-/// The keyframes of the true poses.
+/// Returns the keyframes seen from the true poses.
 std::vector<KeyframeDepthMap> seenAlong(const Edges& world, const Poses& truth,
                                         std::mt19937& random) {
   std::vector<KeyframeDepthMap> seen;
@@ -61,7 +61,7 @@ Poses noisy(const Poses& truth, double sigma_m, double sigma_rad, std::mt19937& 
   return tracked;
 }
 
-/// With a random walk per metre of path.
+/// Adds a random walk to the poses: standard deviations per root of a metre of path.
 Poses drifting(const Poses& truth, double per_m, double rad_per_m, std::mt19937& random) {
   Poses tracked = {truth.front()};
   for (std::size_t i = 1; i < truth.size(); ++i) {
@@ -94,8 +94,8 @@ struct Errors {
   double rad = 0;
 };
 
-/// Root mean squares of the relative poses of all pairs. Not aligned: on a short arc one wrong
-/// keyframe would rotate the alignment.
+/// Returns the root mean square errors of the relative poses of all pairs. The poses are not
+/// aligned: on a short arc one wrong keyframe would rotate the alignment.
 Errors errorsOf(const Poses& estimate, const Poses& truth) {
   double squared_m = 0;
   double squared_rad = 0;
@@ -137,7 +137,7 @@ TEST(KeyframeRefiner, TakesMostOfATrackersNoiseAway) {
 
 TEST(KeyframeRefiner, ALoopTakesTheDriftOutOfItsEnd) {
   std::mt19937 random(1);
-  const Poses truth = circle(36, 11);  // 385 deg: the end sees the begin
+  const Poses truth = circle(36, 11);  // 385 deg: the last keyframes see the begin
   const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
   const Poses tracked = drifting(truth, 0.03, 1.5 * kRadiansPerDegree, random);
   const Rigid3 end = truth.front().inverse() * truth.back();
@@ -335,7 +335,7 @@ TEST(KeyframeRefiner, SaysWhichKeyframesMoved) {
   }
 }
 
-/// Edges that repeat every 1.5 m along x.
+/// Draws edges that repeat every 1.5 m along x.
 Edges repeatingEdges(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   Edges world;
@@ -396,7 +396,7 @@ TEST(KeyframeRefiner, CorrectsCurrentPosesOfTheTrackerAndStatesTheirCovariance) 
   constexpr int kSeeds = 4;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937 random(seed);
-    const Poses truth = circle(9, 5);  // the window reaches back to the first
+    const Poses truth = circle(9, 5);  // the window includes the first pose
     const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
     Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
     tracked[0] = truth[0];
@@ -409,7 +409,7 @@ TEST(KeyframeRefiner, CorrectsCurrentPosesOfTheTrackerAndStatesTheirCovariance) 
     ASSERT_EQ(covariance.llt().info(), Eigen::Success) << seed;
     EXPECT_LT(metresApart(refiner.T_world_odom() * tracked.back(), refiner.T_world_ref_denoised()),
               1e-9);
-    // The next pose of the tracker, between keyframes, with its own noise.
+    // The next pose of the tracker is between keyframes and has its own noise.
     const Rigid3 now = truth.back() * viewTurned(0.02, {0.02, 0, 0});
     const Rigid3 corrected =
         refiner.T_world_odom() * (now * drawMotion(0.01, 0.5 * kRadiansPerDegree, random));
@@ -418,7 +418,7 @@ TEST(KeyframeRefiner, CorrectsCurrentPosesOfTheTrackerAndStatesTheirCovariance) 
         differenceOf({(corrected.rotation * now.rotation.conjugate()), {}}).tail<3>();
     squared_sigmas += error.dot(covariance.ldlt().solve(error));
   }
-  // Chi-squared of 24 degrees of freedom: above 48 for one of 400 draws.
+  // Chi-squared with 24 degrees of freedom is above 48 in one of 400 draws.
   EXPECT_LT(squared_sigmas, 48);
   EXPECT_GT(squared_sigmas, 3);
 }
@@ -440,7 +440,7 @@ TEST(KeyframeRefiner, AJumpOfTheTrackerAndBackLeavesNoError) {
       if (i == 5) continue;
       const Rigid3 T_first_ref = walk.truth[0].inverse() * walk.truth[i];
       const Rigid3 refined_first = refined[0].inverse() * refined[i];
-      // Four standard deviations of the tracker, of two poses.
+      // Four standard deviations of the difference of two tracker poses.
       EXPECT_LT(metresApart(refined_first, T_first_ref), 4 * std::sqrt(2) * 0.02)
           << jump_m << ", " << i;
     }

@@ -28,7 +28,7 @@ using test::radiansApart;
 using test::seenFrom;
 using test::viewTurned;
 
-/// Two views of a world a step apart; the first is the map.
+/// Two views of a world, one step apart. The first view is the map.
 struct Step {
   Rigid3 T_world_map = viewTurned(0, {0, 0, 0});
   Rigid3 T_world_ref = viewTurned(4 * kRadiansPerDegree, {0.15, 0.02, 0.05});
@@ -69,11 +69,11 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegre
     squared_sigmas += std::pow(errorOf(factor, step.T_world_map, step.T_world_ref), 2) -
                       std::pow(errorOf(factor, step.T_world_map, found.T_world_ref), 2);
   }
-  // Pixels of 0.44 deg, 1.3 cm wide at 3 m, and some 800 points, each of which says something
-  // across its edge alone: 6.6 mm and 0.15 deg, as rotation and translation go together.
+  // About 800 points are measured across their edges only, with pixels of 0.44 deg (1.3 cm at 3 m):
+  // errors of 6.6 mm and 0.15 deg, because rotation and translation are correlated.
   EXPECT_LT(std::sqrt(squared_m / kSeeds), 0.009);
   EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.2 * kRadiansPerDegree);
-  // Chi-squared of 48 degrees of freedom: above 75 for 1 % of draws.
+  // Chi-squared with 48 degrees of freedom is above 75 in 1 % of the draws.
   EXPECT_LT(squared_sigmas, 75);
   EXPECT_GT(squared_sigmas, 5);
 }
@@ -85,7 +85,7 @@ TEST(KeyframeRegistration, FindsAPoseThatAnUncertainPriorMissesByManyPixels) {
     const Rigid3 off = viewTurned(3 * kRadiansPerDegree, {0.06, -0.04, 0.03});  // 7 px and 2 px
     const Registration found =
         step.from(priorOf(step.T_world_ref * off, 0.05, 2 * kRadiansPerDegree));
-    // Twice the errors with the more certain prior above.
+    // Limits are twice those of the more certain prior above.
     EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.018) << seed;
     EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.4 * kRadiansPerDegree) << seed;
   }
@@ -115,7 +115,7 @@ TEST(KeyframeRegistration, ItsFactorsHaveTheirMinimumAtItsPose) {
     std::mt19937 random(seed);
     const Step step(test::edgesAround(150, random), random);
     const Rigid3 off = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
-    // With an uncertain prior the points determine the pose.
+    // The points determine the pose, because the prior is uncertain.
     const Registration found = step.from(priorOf(off, 0.5, 0.2));
     // The minimum may be off by the motion of the last round.
     const RelativePoseFactor& factor = found.factors[0];
@@ -159,8 +159,8 @@ TEST(KeyframeRegistration, AlongStripesItStaysWithThePrior) {
     const Step step(test::stripes(), random);
     const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0, random);
     const Registration found = step.from(priorOf(off, 0.02, 0.2 * kRadiansPerDegree));
-    // A point's nearest neighbour along a stripe is nearby it, wherever it is: what holds x there
-    // is chance, and rotation about y within its prior (0.2 deg at 3 m: 1 cm).
+    // Along a stripe, every point has a near neighbour. Only chance and the rotation about y change
+    // x; the rotation stays within its prior (0.2 deg at 3 m: 1 cm).
     const Eigen::Vector3d before = off.translation - step.T_world_ref.translation;
     const Eigen::Vector3d after = found.T_world_ref.translation - step.T_world_ref.translation;
     EXPECT_NEAR(after.x(), before.x(), 0.01) << seed;
@@ -191,7 +191,7 @@ void put(KeyframeDepthMap& keyframe, int x, int y, float depth, float sigma) {
   keyframe.map.variance(y, x) = sigma * sigma;
 }
 
-/// A wall 2 m before the view.
+/// Returns a wall 2 m in front of the view.
 KeyframeDepthMap wall(float sigma) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
   keyframe.map.depth = 2;
@@ -206,7 +206,7 @@ RegistrationCloudOptions few(int max_points, int max_map_points) {
   return options;
 }
 
-/// The pixel of a point.
+/// Returns the pixel of a point.
 cv::Point pixelOf(const RegistrationPoint& point) {
   const Eigen::Vector2d at = smallView().project(point.p_ref.cast<double>());
   return {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))};
@@ -241,7 +241,7 @@ TEST(RegistrationCloud, SpreadsItsPointsWhereOneCornerIsTheMostCertain) {
 TEST(RegistrationCloud, SelectsTheMostCertainPointsOfACell) {
   KeyframeDepthMap keyframe = wall(0.02F);
   for (int y = 0; y < 120; y += 4) {
-    for (int x = 0; x < 160; x += 4) put(keyframe, x, y, 2, 0.002F);  // 1200 of them
+    for (int x = 0; x < 160; x += 4) put(keyframe, x, y, 2, 0.002F);  // 1200 points
   }
   const RegistrationCloud cloud(keyframe, few(100, 400));
   for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
@@ -252,11 +252,11 @@ TEST(RegistrationCloud, SelectsTheMostCertainPointsOfACell) {
 }
 
 TEST(RegistrationCloud, MeasuresCertaintyByDepthNotByItsInverse) {
-  // The same variance of inverse depth: 1 m is known to 2 mm, 4 m to 3.2 cm.
+  // The variance of inverse depth is the same: the sigma is 2 mm at 1 m and 3.2 cm at 4 m.
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
   for (int x = 40; x < 60; ++x) put(keyframe, x, 50, x < 50 ? 4.0F : 1.0F, 0.002F);
   const RegistrationCloud cloud(keyframe, few(10, 10));
-  // Cells are 40 px wide: 20 of these, all in one.
+  // Cells are 40 px wide: all 20 points are in one cell.
   for (const RegistrationPoint& point : cloud.points()) EXPECT_EQ(point.p_ref.z(), 1.0F);
 }
 
@@ -269,18 +269,18 @@ TEST(RegistrationCloud, AnEdgeIsLongAlongItselfAndUncertainAlongTheRay) {
     int looked_at = 0;
     for (const RegistrationPoint& point : cloud.points()) {
       const double column = keyframe.view.project(point.p_ref.cast<double>()).x();
-      if (column < 13 || column > 146) continue;  // ends
+      if (column < 13 || column > 146) continue;  // ends of the edge
       ++looked_at;
-      // Seven adjacent pixels of 2 m / 130 have a variance of 4. The position has a sigma of half a
-      // pixel; the depth has 6 sigmas of 2 m times 2 m times sigma along the ray.
+      // Seven adjacent pixels (of 2 m / 130) have a variance of 4 pixels^2. The sigma of the
+      // position is half a pixel; the sigma of the depth is 6 * 2 m * 2 m * sigma along the ray.
       const double pixel_m = 2.0 / 130;
       Eigen::Matrix3d expected = std::pow(0.5 * pixel_m, 2) * Eigen::Matrix3d::Identity();
       expected(0, 0) += 4 * pixel_m * pixel_m;
-      expected(0, 0) += std::pow(100 * pixel_m, 2);  // not measured along an edge
+      expected(0, 0) += std::pow(100 * pixel_m, 2);  // no measurement along an edge
       const Eigen::Vector3d along = point.p_ref.cast<double>() * 6 * 2 * sigma;
       expected += along * along.transpose();
       EXPECT_LT((point.covariance.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-6)
-          << column;  // floats
+          << column;  // rounding of floats
     }
     EXPECT_EQ(looked_at, 134) << sigma;
   }
@@ -325,7 +325,7 @@ RC_GTEST_PROP(RegistrationCloud, FindsTheSameNeighbourAsBruteForce, ()) {
             std::min(least, (coordinates(point.p_ref.cast<double>()) - coordinates(p_ref)).norm());
       }
       const auto index = cloud.nearest(p_ref, within_px);
-      constexpr double kFloatPx = 1e-3;  // columns and inverse depths of some hundreds
+      constexpr double kFloatPx = 1e-3;  // rounding of some hundreds of pixels
       if (least < within_px - kFloatPx) RC_ASSERT(index.has_value());
       if (least > within_px + kFloatPx) RC_ASSERT(!index.has_value());
       if (!index) continue;
@@ -356,13 +356,13 @@ TEST(RegistrationCloud, PointsBetweenItsMinAndMaxDepthAreInView) {
   EXPECT_TRUE(cloud.isInView({0, 0, 2}));
   EXPECT_TRUE(cloud.isInView({0, 0, 1.001}));
   EXPECT_TRUE(cloud.isInView({0, 0, 3.999}));
-  // Three standard deviations of inverse depth, 0.03 1/m, beyond either.
+  // The range is wider by three standard deviations of inverse depth, 0.03 1/m, on each side.
   EXPECT_TRUE(cloud.isInView({0, 0, 1 / 1.029}));
   EXPECT_FALSE(cloud.isInView({0, 0, 1 / 1.031}));
   EXPECT_TRUE(cloud.isInView({0, 0, 1 / 0.221}));
   EXPECT_FALSE(cloud.isInView({0, 0, 1 / 0.219}));
   EXPECT_FALSE(cloud.isInView({0, 0, -2}));
-  // Half the view is 79.5 / 130 = 0.61 to the side, 59.5 / 130 = 0.46 up and down.
+  // From its centre the view extends 79.5 / 130 = 0.61 sideways and 59.5 / 130 = 0.46 up and down.
   EXPECT_TRUE(cloud.isInView({1.22, 0, 2}));
   EXPECT_FALSE(cloud.isInView({1.23, 0, 2}));
   EXPECT_TRUE(cloud.isInView({0, -0.91, 2}));
@@ -374,7 +374,7 @@ TEST(RegistrationCloud, PointsBetweenItsMinAndMaxDepthAreInView) {
 
 TEST(RegistrationCloud, IgnoresPixelsWithoutADepthOrAVariance) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
-  put(keyframe, 30, 30, 2, 0.5F);  // an infinite depth is within three sigmas
+  put(keyframe, 30, 30, 2, 0.5F);  // three sigmas include infinite depth
   put(keyframe, 31, 30, 2, kInfinity);
   put(keyframe, 32, 30, 2, kFloatNan);
   put(keyframe, 33, 30, kFloatNan, 0.01F);
@@ -396,7 +396,7 @@ TEST(RegistrationCloud, AnUncertainDepthHasACovarianceWithinAFloat) {
     EXPECT_EQ(cloud.points().size(), 22U) << sigma;
     for (const RegistrationPoint& point : cloud.points()) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(point.covariance.cast<double>());
-      // The square of a thousandth of its length; the rounding of a float is a twentieth of that.
+      // The least eigenvalue is the square of 1/1000 of the length. Float rounding is 1/20 of that.
       const double least = 1e-6 * eigen.eigenvalues().maxCoeff();
       EXPECT_NEAR(eigen.eigenvalues().minCoeff(), least, 0.3 * least) << sigma;
     }

@@ -32,12 +32,12 @@ std::optional<RelativePoseFactor> verify(const Rigid3& T_older_newer,
 
 TEST(ViewOverlap, IsTheFractionOfPointsInView) {
   KeyframeDepthMap wall = test::emptyKeyframe(test::smallView());
-  const cv::Rect inside(2, 2, 156, 116);  // as depth is extracted
+  const cv::Rect inside(2, 2, 156, 116);  // as in extracted depth maps
   wall.map.depth(inside) = 2;
   wall.map.variance(inside) = 1e-4;
   const RegistrationCloud cloud(wall, {});
   EXPECT_EQ(viewOverlap(cloud, cloud, {}), 1);
-  const double half_m = 80 * 2.0 / 130;  // half the image, 2 m away; points are the first of cells
+  const double half_m = 80 * 2.0 / 130;  // half the image at 2 m
   EXPECT_NEAR(viewOverlap(cloud, cloud, viewTurned(0, {half_m, 0, 0})), 0.5, 0.07);
   EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(0, {2.5 * half_m, 0, 0})), 0);
   EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(M_PI, {0, 0, 0})), 0);
@@ -91,7 +91,7 @@ TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
     const Rigid3 wrong = T_world_newer * drawMotion(0.3, 8 * kRadiansPerDegree, random);
     const auto factor = verify(wrong, older, newer, 0.3, 8 * kRadiansPerDegree);
     if (!factor) continue;
-    ++confirmed;  // then at the right pose
+    ++confirmed;  // the pose must be right
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << draw;
     EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 1 * kRadiansPerDegree) << draw;
   }
@@ -99,7 +99,7 @@ TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
 }
 
 TEST(VerifyLoop, APlaceWithThreeTimesAsManyEdgesIsAnotherOne) {
-  // All points of the newer keyframe have neighbours, a third of the older one have.
+  // All points of the newer keyframe have neighbours, but only a third of the older points.
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     Edges world = test::edgesAround(100, random);

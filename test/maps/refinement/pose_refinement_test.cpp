@@ -40,14 +40,14 @@ RC_GTEST_PROP(PoseDifference, OfAPoseGivesThePoseBack, ()) {
   const Rigid3 T_a_b = drawPose(1e3, random);
   const Rigid3 back = rigidFromDifference(differenceOf(T_a_b));
   RC_ASSERT(back.translation == T_a_b.translation);
-  // As matrices: a quaternion and its negative are the same rotation.
+  // Matrices are compared, because a quaternion and its negative are the same rotation.
   RC_ASSERT((back.rotation.matrix() - T_a_b.rotation.matrix()).norm() < 1e-14);
 }
 
 RC_GTEST_PROP(PoseDifference, IsFoundAgainUpToHalfARotation, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   const Eigen::Vector3d axis = drawVector(1, random).normalized();
-  // Near pi the angle depends on the scalar of the quaternion alone: 1e-9 is the limit.
+  // Near pi, only the scalar of the quaternion determines the angle: 1e-9 is the limit.
   for (const double angle : {1e-300, 1e-20, 1e-12, 1e-6, 1e-3, 1.0, M_PI - 1e-3, M_PI - 1e-9}) {
     const Vector6d difference = rotationOnly(angle * axis);
     RC_ASSERT((differenceOf(rigidFromDifference(difference)) - difference).norm() <=
@@ -90,7 +90,7 @@ using test::sameBits;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Derivative of an error by the small motions of a pose: central differences.
+/// Returns the derivative of an error by the small motions of a pose: central differences.
 Eigen::MatrixXd byMotions(const std::function<Eigen::VectorXd(const Rigid3&)>& error,
                           const Rigid3& pose, double step) {
   Eigen::MatrixXd jacobian(error(pose).size(), 6);
@@ -116,7 +116,7 @@ RelativePoseFactor factorBetween(std::size_t from, std::size_t to, const Rigid3&
   return {from, to, T_from_to, sqrt_information.asDiagonal()};
 }
 
-/// Points of a keyframe and of the map that are the same but for noise.
+/// Draws points of a keyframe and the same points of the map with noise.
 std::vector<PointPair> drawPairs(const Rigid3& T_map_ref, int count, double sigma_m,
                                  std::mt19937& random) {
   std::vector<PointPair> pairs;
@@ -136,7 +136,7 @@ AlignmentOptions patient() {
   return options;
 }
 
-/// Neighbours on a ring, and those two apart, hold each other exactly.
+/// Returns a ring of nodes with exact factors between nodes that are one or two steps apart.
 PoseGraph ring(std::size_t count) {
   PoseGraph graph;
   for (std::size_t i = 0; i < count; ++i) {
@@ -177,15 +177,15 @@ RC_GTEST_PROP(AlignToMap, FindsThePoseOfExactPairs, ()) {
   const Rigid3 T_map_ref = drawPose(3, random);
   const std::vector<PointPair> pairs = drawPairs(T_map_ref, 50, 0, random);
   const Rigid3 start = T_map_ref * drawMotion(0.02, 0.01, random);
-  // A prior of 1 m and 1 rad against 50 pairs of 1 cm keeps 1e-4 / 50 of the 4 cm.
+  // A prior of 1 m and 1 rad keeps 1e-4 / 50 of the 4 cm against 50 pairs of 1 cm.
   const Rigid3 found = alignToMap(pairs, priorOf(start, 1, 1), start, patient()).value();
   RC_ASSERT(metresApart(found, T_map_ref) < 1e-5);
   RC_ASSERT(radiansApart(found, T_map_ref) < 1e-5);
 }
 
 TEST(AlignToMap, WeighsPairsAndPriorByTheirInformation) {
-  // 4 pairs of 1 cm say 9 mm farther than a prior of 1 cm: 4/5 of it, worked out by hand. The
-  // rotation is held.
+  // 4 pairs (sigma 1 cm) are 9 mm farther than the prior (sigma 1 cm): the result is 4/5 of 9 mm,
+  // worked out by hand. The rotation is held by its prior.
   std::vector<PointPair> pairs;
   for (const double x : {-1, 1}) {
     for (const double y : {-1, 1}) {
@@ -200,12 +200,12 @@ TEST(AlignToMap, WeighsPairsAndPriorByTheirInformation) {
   EXPECT_NEAR(found.translation.y(), 0, 1e-6);
 }
 
-/// Solving ends where the sum of squares, 0.25 here, changes by less than 1e-6 of it: 5e-4 of the
-/// standard deviations of the prior, 0.1 m and 0.05 rad.
+/// Solving ends if the sum of squares (here 0.25) changes by less than the fraction 1e-6: by 5e-4
+/// standard deviations of the prior (0.1 m, 0.05 rad).
 constexpr double kSolvedTo = 5e-5;
 
-/// The motion from the prior by pairs that constrain the points along some directions only. The map
-/// is 5 cm farther along z.
+/// Returns the motion from the prior. The pairs constrain the points along the directions `held`
+/// only. The map is 5 cm farther along z.
 Vector6d alignedAlong(const std::vector<Eigen::Vector3d>& p_ref, const Eigen::Vector3d& held,
                       const Rigid3& T_map_ref) {
   std::vector<PointPair> pairs;
@@ -247,11 +247,11 @@ TEST(AlignToMap, OutliersOfAThirdOfThePairsHaveLittleWeight) {
     std::mt19937 random(seed);
     const Rigid3 T_map_ref = drawPose(3, random);
     std::vector<PointPair> pairs = drawPairs(T_map_ref, 200, 0.01, random);
-    const Eigen::Vector3d aside(0.3, 0.2, -0.1);  // to one side: no average
+    const Eigen::Vector3d aside(0.3, 0.2, -0.1);  // all to one side: no average of 0
     for (int i = 0; i < 60; ++i) pairs[i].p_map += aside;
     const Rigid3 start = T_map_ref * drawMotion(0.02, 0.01, random);
     const Rigid3 found = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, patient()).value();
-    // 140 pairs of 1 cm at 3 m: about 2 mm, because rotation and translation are correlated.
+    // 140 pairs of 1 cm at 3 m give about 2 mm, because rotation and translation are correlated.
     // Outliers at 37 sigmas still have 1/12 of the maximum weight of a pair.
     EXPECT_LT(metresApart(found, T_map_ref), 0.008) << seed;
     EXPECT_LT(radiansApart(found, T_map_ref), 0.004) << seed;
@@ -295,7 +295,7 @@ TEST(SolvePoseGraph, ARingComesBackFromAPerturbedStartAndFixedPosesStay) {
 }
 
 TEST(SolvePoseGraph, AnOffsetMovesAFactorsMinimumByAsMuch) {
-  // error = 100 d + 2: least where d = -2 cm along the first axis.
+  // The error is 100 d + 2, least at d = -2 cm (d: translation along the first axis).
   PoseGraph graph{{Rigid3{}, Rigid3{}}, {true, false}, {factorBetween(0, 1, {}, 0.01, 0.01)}};
   graph.factors[0].offset[0] = 2;
   solvePoseGraph({}, graph);
