@@ -36,15 +36,15 @@ TEST(NearestName, IsTheNameWithTheFewestWrongLetters) {
     const char* nearest;  ///< "": none.
   } cases[] = {
       {"num_plane", keys, "num_planes"},    // a letter is missing
-      {"num_pllanes", keys, "num_planes"},  // one too many
-      {"nun_planes", keys, "num_planes"},   // another one
-      {"num_plnaes", keys, "num_planes"},   // two swapped
+      {"num_pllanes", keys, "num_planes"},  // an added letter
+      {"nun_planes", keys, "num_planes"},   // a wrong letter
+      {"num_plnaes", keys, "num_planes"},   // two swapped letters
       {"Num-Planes", keys, "num_planes"},   // capitals and dashes do not count
-      {"min_dept_m", keys, "min_depth_m"},  // not max_depth_m, which has three more
-      {"mix", rules, "min"},                // the first of two at the same distance
+      {"min_dept_m", keys, "min_depth_m"},  // max_depth_m has three more edits
+      {"mix", rules, "min"},                // the first of two equally near names
       {"harmoic", rules, "harmonic"},       //
       {"mpa", commands, "map"},             // a swap is one edit: a third of three letters
-      {"dxeth", commands, ""},              // no swap: only one of two letters is the other's
+      {"dxeth", commands, ""},              // no swap: only one of two letters matches
       {"dpxth", commands, ""},              //
       {"pam", commands, ""},                // two edits are two thirds of three letters
       {"nm_plns", keys, "num_planes"},      // three of ten letters: the limit
@@ -225,7 +225,7 @@ TEST_F(AtomicFileTest, FilesOfOthersStay) {
 TEST_F(AtomicFileTest, TheLongestNamesThatTheSystemTakesAreWritten) {
   for (const std::size_t length : {234U, 255U}) {
     const std::string name(length - 4, 'n');
-    AtomicFile first(folder / (name + ".txt"));  // its temporary name is that of the next, cut
+    AtomicFile first(folder / (name + ".txt"));  // the next file has the same temporary name
     writeAtomically(folder / (name + ".txt"), [](const auto& file) { std::ofstream(file) << "x"; });
     EXPECT_EQ(readText(folder / (name + ".txt")), "x");
     NewFolder made(folder / std::string(length, 'f'));
@@ -281,7 +281,7 @@ TEST_F(AtomicFileTest, FoldersAndDevicesAreNotReplaced) {
 
 TEST_F(AtomicFileTest, TheTargetOfALinkIsReplacedAndTheLinkStays) {
   fs::create_directory(folder / "real");
-  fs::create_symlink("real/a.txt", folder / "relative.txt");  // nothing there yet
+  fs::create_symlink("real/a.txt", folder / "relative.txt");  // the target does not exist yet
   fs::create_symlink(folder / "relative.txt", folder / "absolute.txt");
   writeText(folder / "absolute.txt", "text");
   EXPECT_EQ(readText(folder / "real" / "a.txt"), "text");
@@ -295,7 +295,7 @@ TEST_F(AtomicFileTest, LinksThatLeadToAFolderOrInACircleAreErrors) {
   fs::create_symlink("b", folder / "a");
   fs::create_symlink("a", folder / "b");
   EXPECT_THAT(errorOf(folder / "a"), HasSubstr("too many symbolic links"));
-  // A chain of 40 links, as Linux has it, and of one more.
+  // A chain of 40 links (the limit of Linux) and a chain of 41 links.
   for (int i = 0; i <= 40; ++i) {
     fs::create_symlink(std::to_string(i), folder / std::to_string(i + 1));
   }

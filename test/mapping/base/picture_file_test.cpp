@@ -48,7 +48,7 @@ std::string chunk(const std::string& name_and_data) {
          bigEndian(static_cast<std::uint32_t>(crc32(0, data, size)));
 }
 
-/// A PNG of any kind: its rows are those of 8-bit pixels.
+/// Returns the bytes of a PNG of any kind, with the rows of 8-bit pixels.
 std::string png(std::uint32_t width, std::uint32_t height, char bits, char colours,
                 const cv::Mat1b& rows, bool transparent = false) {
   std::string filtered;
@@ -74,10 +74,10 @@ struct TiffKind {
 
 class TiffFiles : public TemporaryFolder {
  protected:
-  /// The bytes of a TIFF that libtiff writes, 37 x 21 pixels.
+  /// Returns the bytes of a TIFF that libtiff writes, 37 x 21 pixels.
   std::string tiff(const TiffKind& kind) {
     cv::Mat image = randomPixels({37, 21}, kind.type);
-    written_ = image.clone();  // libtiff swaps the bytes of what it writes
+    written_ = image.clone();  // libtiff swaps the bytes in place
     const std::string file = (folder() / "a.tiff").string();
     TIFF* tiff = TIFFOpen(file.c_str(), kind.mode);
     TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, image.cols);

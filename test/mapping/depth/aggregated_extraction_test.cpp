@@ -21,7 +21,7 @@ using test::ChosenDsi;
 
 DepthPlanes planesOf(int count) { return DepthPlanes({0.5, 5.0, count, PlaneSpacing::kInverse}); }
 
-/// Position of a depth between planes of inverse spacing: the inverse of `DepthPlanes::depthAt`.
+/// Returns the position of a depth between planes of inverse spacing (inverse of `depthAt`).
 double planePosition(const DepthPlanes& planes, double depth_m) {
   const double first = 1 / planes.depth(0);
   const double last = 1 / planes.depth(planes.size() - 1);
@@ -36,13 +36,13 @@ double ridge(double plane, double at, double sigma) {
   return std::exp(-(plane - at) * (plane - at) / (2 * sigma * sigma));
 }
 
-/// Fraction of the votes of the nearest edge in a column of pixels.
+/// Returns the fraction of the nearest edge's votes that a column of pixels has.
 double acrossEdge(int x) {
   const double off = x % 12 - 6;
   return std::exp(-off * off / (2 * 0.7 * 0.7));
 }
 
-/// A plane of edges that all have the same ray.
+/// Returns edges that all have the same values along their rays.
 ChosenDsi edges(const cv::Size& size, int planes, const std::function<double(int plane)>& ray) {
   ChosenDsi dsi(size, planes);
   for (int y = 0; y < size.height; ++y) {
@@ -53,7 +53,7 @@ ChosenDsi edges(const cv::Size& size, int planes, const std::function<double(int
   return dsi;
 }
 
-/// Edges with different depths, some of them wrong, and noise everywhere.
+/// Draws edges with different depths, some wrong depths, and noise everywhere.
 ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -91,7 +91,7 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
                {40, kFar, 1},
                {100, kFar, 1},
                {250, kFar, 249 / 99.0},
-               // 6.3 and 9 pixels of parallax between the limits: an eighth of a pixel.
+               // Parallax between the limits: 6.3 and 9 pixels. A step is 1/8 pixel.
                {40, 3.5, 39 * 0.125 / 6.3},
                {100, 5, 99 * 0.125 / 9}};
   for (const auto& [planes, parallax_px_m, step_planes] : cases) {
@@ -128,7 +128,7 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
       EXPECT_GT(kept, kept_before + 40) << planes << " planes, window " << window;
     }
   }
-  // Where rounding decides whether a pixel is looked at, those around it may differ too.
+  // If rounding decides whether a pixel is a candidate, the pixels around it may differ too.
   EXPECT_LE(differing, kept / 1000) << "of " << kept;
 }
 
@@ -137,7 +137,7 @@ TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsColumnIsFlat)
   std::uniform_real_distribution<double> noise(0, 0.01);
   std::vector<double> flat(100);
   for (double& value : flat) value = 1 + noise(random);
-  flat[50] = 1.011;  // where the peak happens to be
+  flat[50] = 1.011;  // the peak is here by chance
   const auto ray = [&](int plane) { return 20 * flat[static_cast<std::size_t>(plane)]; };
   EXPECT_EQ(cv::countNonZero(extract(edges({60, 40}, 100, ray)).depth), 0);
 }
@@ -155,7 +155,7 @@ TEST(AggregatedExtraction, TheContrastThresholdAndDilationAreThoseOfTheOptions) 
 }
 
 TEST(AggregatedExtraction, MorePlanesThanTheParallaxTellsApartLoseNoPoints) {
-  // A peak of a pixel, of three pixels between the limits.
+  // The peak is one pixel of parallax wide; the limits are three pixels apart.
   std::vector<int> points;
   for (const int planes : {20, 50, 100, 200, 400}) {
     const double px = (planes - 1) / 3.0;
@@ -167,7 +167,7 @@ TEST(AggregatedExtraction, MorePlanesThanTheParallaxTellsApartLoseNoPoints) {
     const PixelCounts& pixels = map.pixels;
     EXPECT_EQ(pixels.candidates, pixels.at_nearest + pixels.at_farthest + pixels.ambiguous +
                                      static_cast<std::uint64_t>(points.back()));
-    // The whole range within half of a pixel tells nothing.
+    // A range of half a pixel of parallax gives no depth.
     EXPECT_EQ(
         cv::countNonZero(extractAggregated(dsi.swept(), planesOf(planes), {}, 0.5 / 1.8).depth), 0);
   }
@@ -211,7 +211,7 @@ Depths randomDepths(std::uint32_t seed, const cv::Size& size, int one_of) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       if (random() % static_cast<unsigned>(one_of) == 0) {
-        // In half planes, so that some are equal and some exactly as far apart as the limit.
+        // Positions are multiples of 1/2 plane: some are equal, some differ by exactly the limit.
         depths.keep({x, y}, std::round(2 * position(random)) / 2, weight(random));
       }
     }
@@ -219,7 +219,7 @@ Depths randomDepths(std::uint32_t seed, const cv::Size& size, int one_of) {
   return depths;
 }
 
-/// The three numbers from their definitions, in double.
+/// Computes the three numbers from their definitions, in double.
 LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
   std::vector<std::pair<double, double>> around;  // position, weight
   double agreeing = 0;
@@ -242,7 +242,7 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
       }
     }
   }
-  // The smallest position with half of the weight at or below it.
+  // The median is the smallest position with half of the weight at or below it.
   double median = INFINITY;
   for (const auto& candidate : around) {
     double at_or_below = 0;
@@ -276,7 +276,7 @@ TEST(LocalAgreement, EqualsTheNaiveOneOnDenseAndSparsePixels) {
 
 // --- The sum of the rays around each pixel -------------------------------------------------------
 
-/// Ridges of several heights on every ray, and noise.
+/// Draws ridges of several heights on every ray, and noise.
 ChosenDsi randomDsi(std::uint32_t seed, const cv::Size& size, int planes) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -311,7 +311,7 @@ std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mas
   return aggregateColumns(SparseMask(mask), swept.columns, planesPerStep(swept.columns.planes()));
 }
 
-/// The sum of the rays of the chosen pixels in 9x9, in double.
+/// Returns the sum of the rays of the chosen pixels in 9x9, in double.
 std::vector<double> naiveSum(const ChosenDsi& dsi, const cv::Mat1b& mask, const cv::Point& pixel) {
   std::vector<double> sum(static_cast<std::size_t>(dsi.planes));
   for (int y = 0; y < mask.rows; ++y) {
@@ -328,7 +328,7 @@ std::vector<double> naiveSum(const ChosenDsi& dsi, const cv::Mat1b& mask, const 
   return sum;
 }
 
-/// Two peaks of the same height up to rounding.
+/// Returns whether two peaks have the same height up to rounding.
 bool isTie(const std::vector<double>& sum, double top) {
   return std::count_if(sum.begin(), sum.end(),
                        [&](double value) { return value > top * (1 - 1e-4); }) > 1;
@@ -416,7 +416,7 @@ TEST(PlanesPerStep, IsOneUpToAHundredPlanesAndGrowsWithThem) {
   for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesPerStep(planes), 1);
   EXPECT_DOUBLE_EQ(planesPerStep(199), 2);
   EXPECT_DOUBLE_EQ(planesPerStep(496), 5);
-  // An eighth of a pixel of little parallax; at most a 24th of the range.
+  // If the parallax is small, a step is an eighth of a pixel, but at most a 24th of the range.
   EXPECT_DOUBLE_EQ(planesPerStep(101, 10), 1.25);
   EXPECT_DOUBLE_EQ(planesPerStep(241, 1), 10);
   EXPECT_DOUBLE_EQ(planesPerStep(11, 1), 10 / 24.0);

@@ -20,14 +20,14 @@
 namespace efm::depth_extraction_test {
 namespace {
 
-constexpr int kPlaneCount = 600;  // more than a byte counts
+constexpr int kPlaneCount = 600;  // more than a byte can count
 
 DsiPeaks emptyPeaks(cv::Size size) {
   return {cv::Mat1f::zeros(size), cv::Mat1i::zeros(size), cv::Mat1f(size, -1.0F),
           cv::Mat1f(size, -1.0F)};
 }
 
-/// Fills in the neighbours of a peak as a DSI would: none beyond the first and the last plane.
+/// Sets a peak's neighbours as in a DSI: none beyond the first and the last plane.
 void setPeak(DsiPeaks& peaks, cv::Point at, int plane, std::mt19937& random) {
   const float peak = peaks.confidence(at);
   const auto below = [&] { return peak * std::uniform_real_distribution<float>(0.5F, 1)(random); };
@@ -36,7 +36,7 @@ void setPeak(DsiPeaks& peaks, cv::Point at, int plane, std::mt19937& random) {
   peaks.after(at) = plane == kPlaneCount - 1 ? -1.0F : below();
 }
 
-/// Nothing like a scene: every pixel has its own confidence and plane.
+/// Draws peaks without a scene: every pixel has its own confidence and plane.
 DsiPeaks noisePeaks(cv::Size size, std::uint32_t seed) {
   std::mt19937 random(seed);
   DsiPeaks peaks = emptyPeaks(size);
@@ -49,7 +49,7 @@ DsiPeaks noisePeaks(cv::Size size, std::uint32_t seed) {
   return peaks;
 }
 
-/// Ridges of votes along slanted edges over a low floor, as a keyframe has them.
+/// Draws ridges of votes along slanted edges over a low floor, as in a keyframe.
 DsiPeaks ridgePeaks(cv::Size size, std::uint32_t seed) {
   std::mt19937 random(seed);
   DsiPeaks peaks = emptyPeaks(size);
@@ -57,7 +57,7 @@ DsiPeaks ridgePeaks(cv::Size size, std::uint32_t seed) {
     for (int x = 0; x < size.width; ++x) {
       const double phase = 0.21 * x + 0.08 * y;
       const double ridge = std::exp(-8 * std::pow(std::sin(phase), 2));
-      // Whole votes, so that some neighbours are equal.
+      // Votes are whole numbers, so that some neighbours are equal.
       peaks.confidence(y, x) =
           static_cast<float>(std::floor(40 * ridge) + static_cast<double>(random() % 4));
       const int plane = 20 + static_cast<int>(15 * std::sin(0.05 * x)) +
@@ -88,7 +88,7 @@ std::vector<DepthExtractionOptions> manyOptions() {
   return all;
 }
 
-/// Depth extraction against its steps written down one by one: the same, bit for bit.
+/// Expects that depth extraction gives the same bits as its steps, computed one by one.
 void expectSame(const DsiPeaks& peaks, const DepthExtractionOptions& options) {
   const bool linear = options.threshold_kernel == 5;
   const DepthPlanes planes(
@@ -132,7 +132,7 @@ TEST(PeakFit, IsTheParabolaThroughThreeValues) {
   constexpr double kErrorOfWidth = 0.17;
   const struct {
     float before, peak, after;
-    double offset;    // of the position from the peak's plane
+    double offset;    // position - plane of the peak, in planes
     double width_sq;  // planes^2
   } cases[] = {
       {7.12F, 9.92F, 8.72F, 0.2, 2.48},  // 10 - 2 (z - 0.2)^2
@@ -169,7 +169,7 @@ TEST(RobustMaximum, IsTheSmallestValueThatNinetyFivePercentDoNotExceed) {
   EXPECT_FALSE(maximum.value());
   std::vector<double> values;
   for (int n = 1; n <= 300; ++n) {
-    const double value = static_cast<double>(random() % 100) - 50;  // many are equal
+    const double value = static_cast<double>(random() % 100) - 50;  // many equal values
     maximum.add(value);
     values.push_back(value);
     std::vector<double> sorted = values;
@@ -183,7 +183,7 @@ TEST(RobustMaximum, IsTheSmallestValueThatNinetyFivePercentDoNotExceed) {
   }
 }
 
-/// Which pixels a fixed white level keeps.
+/// Returns the pixels that a fixed white level keeps.
 cv::Mat1b keptWith(const cv::Mat1f& confidence, double white) {
   const cv::Mat1f none(confidence.size(), -1.0F);
   DepthExtractionOptions options;
@@ -224,7 +224,7 @@ cv::Mat1b randomMask(int width, int height, double share, std::mt19937& random) 
   return mask;
 }
 
-/// Collects and sorts each window.
+/// Computes the median: collects and sorts each window.
 std::vector<float> naiveMedian(const cv::Mat1b& mask, const std::vector<float>& values,
                                int window) {
   cv::Mat1f image = cv::Mat1f::zeros(mask.size());
@@ -253,7 +253,7 @@ TEST(MaskedMedian, EqualsTheMedianOfTheSortedWindow) {
     const double share = std::array<double, 4>{0.05, 0.3, 0.9, 1.0}[random() % 4];
     const cv::Mat1b mask = randomMask(width, height, share, random);
     std::vector<float> values(static_cast<std::size_t>(cv::countNonZero(mask)));
-    // Few different ones in some trials, so that many are equal; of both signs.
+    // Some trials have few different values, so that many are equal. Values have both signs.
     const float spread = trial % 2 == 0 ? 3.0F : 1e6F;
     for (float& value : values) {
       value = std::floor(std::uniform_real_distribution<float>(-spread, spread)(random)) / 2;

@@ -29,7 +29,7 @@ TEST_P(RunningPeaksOn, AreTheFirstLargestValueOfEachPixelAndItsNeighbours) {
   std::mt19937 random(1);
   for (int width = 1; width <= 70; ++width) {
     test::ChosenDsi dsi({width, 1}, 12);
-    for (float& value : dsi.values) value = static_cast<float>(random() % 6);  // many planes tie
+    for (float& value : dsi.values) value = static_cast<float>(random() % 6);  // many equal values
     RunningPeaks peaks(static_cast<std::size_t>(width), GetParam());
     for (int plane = 0; plane < dsi.planes; ++plane) {
       const auto begin = dsi.values.begin() + plane * width;
@@ -45,7 +45,7 @@ TEST_P(RunningPeaksOn, TheKernelTouchesNoPixelsButItsOwn) {
   constexpr std::size_t kAround = 32;
   for (std::size_t n = 0; n < 40; ++n) {
     std::vector<std::vector<float>> floats(4, std::vector<float>(n + kAround, 1.0F));
-    // As if the pixels beyond had their peak on the plane before: they would be written.
+    // The pixels beyond seem to have their peak on the previous plane: a wrong kernel writes them.
     std::vector<std::int32_t> plane(n + kAround, 0);
     const std::vector<float> values(n + kAround, 2.0F);
     kernels::peakFunctions(GetParam())
@@ -65,7 +65,7 @@ TEST_P(RunningPeaksOn, TheKernelTouchesNoPixelsButItsOwn) {
 using test::RandomRays;
 using test::SweepCase;
 
-/// A byte has the root of the distance below the peak, rounded: an error is small near the peak.
+/// Returns the error of a byte, which stores the rounded root of the distance below the peak.
 float toleranceOf(float exact, float peak) {
   const float below = 1 - exact / peak;
   const float half_step = 0.5F / kernels::kMaxRoot;
@@ -73,7 +73,7 @@ float toleranceOf(float exact, float peak) {
   return peak * (2 * half_step * std::sqrt(below) + half_step * half_step + kTable);
 }
 
-/// Two cameras with random rays all over the view.
+/// Draws two cameras with random rays in the whole view.
 SweepCase stereoCase(const cv::Size& size, int planes, int window) {
   RandomRays random(static_cast<std::uint32_t>(size.area() + planes));
   SweepCase input{random.view(size), DepthPlanes({0.5, 5.0, planes, PlaneSpacing::kInverse}), {}};
@@ -87,7 +87,7 @@ SweepCase stereoCase(const cv::Size& size, int planes, int window) {
 const std::vector<cv::Size> kSizes = {{1, 1},   {2, 2},   {1, 50},   {3, 4},    {17, 16},
                                       {63, 63}, {64, 64}, {65, 127}, {130, 66}, {190, 33}};
 
-/// A swept DSI and its columns.
+/// Expects that the columns are those of a swept DSI.
 void expectColumnsOf(const SweptDsi& swept, const std::vector<float>& dsi, int planes) {
   const cv::Mat1f& confidence = swept.peaks.confidence;
   const DsiColumns& columns = swept.columns;
@@ -108,7 +108,7 @@ void expectColumnsOf(const SweptDsi& swept, const std::vector<float>& dsi, int p
   EXPECT_EQ(columns.size(), count);
 }
 
-/// Whether two DSIs have the same columns with the same bits.
+/// Returns whether two DSIs have the same columns with the same bits.
 bool sameColumns(const SweptDsi& a, const SweptDsi& b) {
   const cv::Size size = a.peaks.confidence.size();
   for (int y = 0; y < size.height; ++y) {
@@ -171,14 +171,14 @@ TEST_P(DsiColumnsOn, WithoutThemTheSweepHasPeaksWithTheirNeighboursAndTheSameCon
   }
 }
 
-/// The Gaussian mean around each pixel of the whole view.
+/// Returns the Gaussian mean around each pixel of the whole view.
 cv::Mat1f surroundingsOf(const cv::Mat1f& confidence, int window) {
   cv::Mat1f surroundings;
   cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
   return surroundings;
 }
 
-/// The number of pixels above their surroundings that have no column.
+/// Returns the number of pixels above their surroundings that have no column.
 int standingOutWithoutColumn(const cv::Mat1f& confidence, const DsiColumns& columns, int window) {
   const cv::Mat1f surroundings = surroundingsOf(confidence, window);
   int without = 0;
@@ -191,7 +191,7 @@ int standingOutWithoutColumn(const cv::Mat1f& confidence, const DsiColumns& colu
 }
 
 TEST_P(DsiColumnsOn, AreSelectedAboveTheSurroundingsAndEverywhereAtTheEdgesOfTiles) {
-  constexpr double kRounding = 1e-4;  // of the mean: too near to tell apart
+  constexpr double kRounding = 1e-4;  // fraction of the mean: rounding decides
   for (const int window : {3, 5, 11, 63, 255}) {
     for (const cv::Size& size : {cv::Size(4, 3), {64, 64}, {150, 70}}) {
       const SweepCase input = stereoCase(size, 3, window);
@@ -226,7 +226,7 @@ TEST_P(DsiColumnsOn, AreSelectedAboveTheSurroundingsAndEverywhereAtTheEdgesOfTil
   }
 }
 
-/// The columns of an image of confidences on a single plane, selected in tiles.
+/// Returns the columns of an image of confidences on a single plane, selected in tiles.
 DsiColumns selectInTiles(const cv::Mat1f& confidence, int window) {
   std::vector<DsiColumns::Tile> columns;
   for (const cv::Rect& tile : tilesOf({confidence.cols, confidence.rows, 1, 1, 0, 0}, 63)) {
@@ -241,8 +241,8 @@ DsiColumns selectInTiles(const cv::Mat1f& confidence, int window) {
 }
 
 TEST(DsiColumns, HowABlurIsRoundedLosesNoPixelThatStandsOut) {
-  // Gradients are their own surroundings: rounding alone decides, and not alike in tiles and in
-  // whole.
+  // The surroundings of a pixel in a gradient have its value: only rounding decides, and it differs
+  // between tiles and the whole image.
   for (const int window : {3, 5, 7, 11, 31}) {
     for (const float gradient : {0.1F, 0.37F, 1e-3F}) {
       cv::Mat1f confidence(130, 171);

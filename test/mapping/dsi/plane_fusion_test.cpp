@@ -18,7 +18,7 @@
 namespace efm {
 namespace {
 
-/// Ray densities as votes make them: not negative, some zero, up to a few thousand.
+/// Draws ray densities like those of votes: not negative, some zero, up to a few thousand.
 rc::Gen<float> density() {
   return rc::gen::oneOf(rc::gen::just(0.0F),
                         rc::gen::map(rc::gen::inRange(1, 4'000'000),
@@ -31,10 +31,10 @@ rc::Gen<std::vector<float>> densities() {
   });
 }
 
-/// The mean of one input each, which every voxel of a plane must have, bit for bit.
-/// @param in_place whether inputs are written to `next`.
+/// Returns the mean of planes with one value each: the same bits in all voxels, otherwise NaN.
+/// @param in_place true if inputs are written to `next`.
 float meanOf(FusionRule rule, const std::vector<float>& inputs, bool in_place) {
-  constexpr std::size_t kVoxels = 37;  // full vectors of any instruction set, and a rest
+  constexpr std::size_t kVoxels = 37;  // not a multiple of any vector size
   FusionAccumulator accumulator(rule, static_cast<int>(inputs.size()), kVoxels);
   for (const float input : inputs) {
     PlaneValues own(kVoxels);
@@ -49,8 +49,8 @@ float meanOf(FusionRule rule, const std::vector<float>& inputs, bool in_place) {
   return same ? values.front() : std::numeric_limits<float>::quiet_NaN();
 }
 
-/// Adding n floats errs by at most n roundings, log and exp by a few more: 16 inputs of up to
-/// log 4000 = 8.3 summed and exponentiated stay within 16 * 16 * 8.3 * 6e-8 = 1.3e-4.
+/// A sum of n floats has an error of at most n roundings; log and exp add a few. The sum of 16
+/// inputs of up to log 4000 = 8.3, exponentiated, stays within 16 * 16 * 8.3 * 6e-8 = 1.3e-4.
 constexpr double kMeanRounding = 2e-4;
 
 RC_GTEST_PROP(FusionRule, EveryRuleIsItsTextbookMean, ()) {
@@ -77,11 +77,11 @@ TEST(FusionRule, OneInputIsItselfBitForBitAndTheNextMeanForgetsIt) {
   }
 }
 
-/// Full vectors of any instruction set, and a rest.
+/// Number of voxels: not a multiple of any vector size.
 constexpr std::size_t kVoxels = 35;
 
-/// A sum of n floats errs by at most n roundings of 6e-8, and log and exp multiply that by the
-/// logarithm, here at most log 1e8 = 18.4: two means of up to 8 inputs stay within 2e-5 each way.
+/// A sum of n floats has an error of at most n roundings of 6e-8. Log and exp multiply the error by
+/// the logarithm, here at most log 1e8 = 18.4: two means of up to 8 inputs stay within +-2e-5.
 constexpr double kRounding = 5e-5;
 
 /// Ray densities of one plane: [camera][group * slots + slot][voxel].
@@ -89,7 +89,7 @@ struct Densities {
   FusionInputs inputs;
   std::vector<std::vector<PlaneValues>> values;
 
-  /// One group by itself.
+  /// Returns one group alone.
   Densities group(int g) const {
     Densities alone{{inputs.cameras, inputs.slots_per_group, 1}, {}};
     for (const auto& camera : values) {
@@ -98,13 +98,13 @@ struct Densities {
     }
     return alone;
   }
-  /// One camera by itself.
+  /// Returns one camera alone.
   Densities camera(int c) const {
     return {{1, inputs.slots_per_group, inputs.groups}, {values[static_cast<std::size_t>(c)]}};
   }
 };
 
-/// Zero in one voxel out of eight, else anything from 1e-4 to 1e4.
+/// Draws zero in one voxel out of eight, otherwise a value from 1e-4 to 1e4.
 Densities randomDensities(std::mt19937& random, const FusionInputs& inputs) {
   std::uniform_real_distribution<double> exponent(-4, 4);
   Densities densities{inputs, {}};
@@ -136,7 +136,7 @@ PlaneValues fuse(const Densities& densities, const FusionOptions& options) {
   return fusion.fused();
 }
 
-/// Calls with random densities of all numbers of inputs that matter, under all pairs of rules in
+/// Calls `check` with random densities for all relevant numbers of inputs, all pairs of rules and
 /// both orders.
 template <typename Check>
 void forEachCase(std::uint32_t seed, const Check& check) {

@@ -28,7 +28,7 @@ TEST(BackgroundActivityFilter, EqualsTheDefinitionOverTheWholePast) {
   for (std::uint32_t seed = 1; seed <= 10; ++seed) {
     test::RandomScene random(seed);
     std::vector<Event> events = random.events(test::smallCamera(), 2000, -50 * kMs, 200 * kMs);
-    for (Event& event : events) event.t_ns -= event.t_ns % kMs;  // also exactly the time apart
+    for (Event& event : events) event.t_ns -= event.t_ns % kMs;  // some are exactly 7 ms apart
     BackgroundActivityFilter filter(48, 36, 7 * kMs);
     for (std::size_t i = 0; i < events.size(); ++i) {
       bool expected = true;
@@ -59,7 +59,7 @@ Event eventAt(std::int64_t t_ns, int x, int y) {
   return {t_ns, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), true};
 }
 
-/// The definition, from the whole past: events of the clock's period and the one before.
+/// Applies the definition to the whole past: events of the current and the previous period.
 std::vector<bool> naivelyHot(const std::vector<Event>& events, int width, int height,
                              const HotPixelOptions& options) {
   const double period_ns = options.period_s * 1e9;
@@ -108,10 +108,10 @@ TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
     CameraModel small = test::smallCamera();
     small.width = seed == 1 ? 1 : 6;
     small.height = seed == 2 ? 1 : 5;
-    // Also before time 0; few pixels, so that busy ones are adjacent.
+    // Times are also before 0. There are few pixels, so that busy pixels are adjacent.
     std::vector<Event> events = random.events(small, 900, -300 * kMs, 900 * kMs);
     for (Event& event : events) {
-      event.t_ns -= event.t_ns % (10 * kMs);  // also at the ends of periods
+      event.t_ns -= event.t_ns % (10 * kMs);  // some at the ends of periods
       const double kind = random.uniform(0, 1);
       if (kind < 0.4) event.x = event.y = 0;
       if (seed <= 2) continue;
@@ -133,7 +133,7 @@ TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
 using test::LongRecording;
 using test::Played;
 
-/// Both filters, so strict that a few thousand events have some of everything.
+/// Returns options with both filters, so strict that a few thousand events have every fate.
 EventFilterOptions strictFilter() {
   EventFilterOptions options;
   options.hot_pixels = true;
@@ -152,7 +152,7 @@ FusionMapperOptions filteredOptions() {
   return options;
 }
 
-/// A recording in which a tenth of the events is of three hot pixels.
+/// Returns a recording with a tenth of the events from three hot pixels.
 LongRecording recordingWithHotPixels(std::uint32_t seed) {
   LongRecording recording(seed, 1.0);
   test::RandomScene random(seed);
@@ -180,7 +180,7 @@ TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {
   for (std::uint32_t seed = 1; seed <= 3; ++seed) {
     const LongRecording recording = recordingWithHotPixels(seed);
     const Played filtered = test::play(recording, filteredOptions(), 0);
-    // The same as a recording without those events.
+    // The result equals that of a recording without the filtered events.
     LongRecording kept = recording;
     for (std::size_t c = 0; c < 2; ++c) {
       EventFilter filter(48, 36, strictFilter());
@@ -215,14 +215,14 @@ TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {
 TEST(FilteredMapping, EventsUpToTenMillisecondsLateAreSortedFilteredOrNot) {
   LongRecording ordered = recordingWithHotPixels(4);
   for (std::vector<Event>& events : ordered.events) {
-    // Each at a time of its own, so that there is one right order.
+    // Every event has a different time, so that only one order is right.
     for (std::size_t i = 0; i < events.size(); ++i) {
       events[i].t_ns += static_cast<std::int64_t>(i);
     }
   }
   LongRecording reversed = ordered;
   for (std::vector<Event>& events : reversed.events) {
-    // Blocks of some 5 ms in reverse.
+    // Blocks of about 5 ms are reversed.
     for (auto block = events.begin(); events.end() - block >= 20; block += 20) {
       std::reverse(block, block + 20);
     }
@@ -257,7 +257,7 @@ TEST(EventBuffer, SortsLateEventsWithTheirMarksAndFreesReleasedOnes) {
   EXPECT_EQ(buffer.insert(std::vector<Event>{{10, 0, 0}, {20, 1, 0}, {30, 2, 0}, {40, 3, 0}}), 0U);
   buffer.used[2] = true;
   EXPECT_EQ(buffer.insert(std::vector<Event>{{20, 4, 0}, {15, 5, 0}, {40, 6, 0}, {50, 7, 0}}), 2U);
-  std::vector<int> order;  // each after others of the same time
+  std::vector<int> order;  // of equal times, later inserted events follow
   for (const Event& event : buffer.events) order.push_back(event.x);
   EXPECT_EQ(order, (std::vector<int>{0, 5, 1, 4, 2, 3, 6, 7}));
   EXPECT_EQ(buffer.used,
@@ -265,7 +265,7 @@ TEST(EventBuffer, SortsLateEventsWithTheirMarksAndFreesReleasedOnes) {
   EXPECT_EQ(buffer.between(20, 40).size(), 3U);
   buffer.begin = 3;
   EXPECT_EQ(buffer.indexOf(0), 3U);
-  buffer.begin = 4;  // a half
+  buffer.begin = 4;  // half of the events
   buffer.compact();
   EXPECT_EQ(buffer.begin, 0U);
   EXPECT_EQ(buffer.events.size(), 4U);

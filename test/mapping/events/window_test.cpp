@@ -18,7 +18,7 @@ using ::testing::ElementsAre;
 
 constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'003;
 
-/// Events at these times, each with its own pixel.
+/// Returns events at these times, each with its own pixel.
 std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
   std::vector<Event> events;
   for (const std::int64_t t_ns : times_ns) {
@@ -40,7 +40,7 @@ TEST(Subintervals, PartsOfEqualDurationEndWhereTheExactFractionIsRoundedDown) {
   for (int draw = 0; draw < 300; ++draw) {
     const auto duration_ns = static_cast<std::int64_t>(1 + random() % 500);
     const int count = static_cast<int>(1 + random() % 20);
-    std::vector<std::int64_t> times_ns;  // one event in every nanosecond
+    std::vector<std::int64_t> times_ns;  // one event per nanosecond
     for (std::int64_t t_ns = 0; t_ns < duration_ns; ++t_ns) times_ns.push_back(kNow_ns + t_ns);
     const std::vector<Event> events = eventsAt(times_ns);
     const auto parts = splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + duration_ns,
@@ -120,7 +120,7 @@ TEST(SubintervalShuffle, RandomIsAPermutationPerCameraThatTheSeedDecides) {
       for (int s = 0; s < 16; ++s) ASSERT_EQ(camera[static_cast<std::size_t>(s)], s);
     }
   }
-  // Two of 15 permutations of 16! = 2e13 are the same with a chance of 5e-12.
+  // Two of 15 permutations (of 16! = 2e13) are equal with a probability of 5e-12.
   EXPECT_EQ(different.size(), 15U);
 }
 
@@ -130,13 +130,13 @@ TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
   std::map<std::vector<int>, int> seen;
   for (const auto& camera : assignSubintervals(6000, options)) ++seen[camera];
   ASSERT_EQ(seen.size(), 6U);
-  // 1000 each; five standard deviations of sqrt(6000 * 1/6 * 5/6) = 29.
+  // 1000 of each are expected, within five standard deviations of sqrt(6000 * 1/6 * 5/6) = 29.
   for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
 }
 
-constexpr Window kWindow{0, 1200, 600};  // every number of sub-intervals below divides it
+constexpr Window kWindow{0, 1200, 600};  // divisible by all numbers of sub-intervals below
 
-/// How a window is divided.
+/// The division of a window.
 struct Division {
   int cameras = 1;
   SplitFusionOptions split;

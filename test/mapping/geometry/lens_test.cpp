@@ -22,7 +22,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-/// The principal point is a pixel.
+/// Returns a camera whose principal point is the centre of a pixel.
 CameraModel davis346(DistortionModel distortion, std::vector<double> coefficients) {
   return {346, 260, 226.38, 226.15, 174, 133, distortion, std::move(coefficients)};
 }
@@ -53,7 +53,7 @@ TEST(Undistortion, APixelOutsideTheLensStandsForTheNextInsideTowardsTheAxis) {
         const Eigen::Vector2d at = model.project(ray.homogeneous());
         const Eigen::Vector2d to_axis = axis - Eigen::Vector2d(x, y);
         const double left = to_axis.normalized().dot(axis - at);
-        // Its column and row are rounded, and the next one outwards has no ray.
+        // The column and row of that pixel are rounded, and the next pixel outwards has no ray.
         ASSERT_LT((axis - at - left * to_axis.normalized()).norm(), 1.5) << x << ", " << y;
         ASSERT_GT(left, 0);
         const Eigen::Vector2d before = at - 2.5 * to_axis.normalized();
@@ -180,7 +180,7 @@ TEST(Rig, WithoutASelectionAllCamerasAreSelected) {
 
 using Real = long double;
 
-/// r of rho, and its derivative.
+/// The distorted radius r of an undistorted radius rho, and dr/drho.
 struct Radius {
   Real r, slope;
 };
@@ -207,7 +207,7 @@ Real lastWhere(const Condition& holds, Real low, Real high) {
   return low;
 }
 
-/// Where the lens folds over: found by a walk outwards from the centre.
+/// Returns rho of the fold of the lens, found by steps outwards from the centre.
 Real foldOf(const std::vector<double>& k, Real max_rho) {
   constexpr Real kStep = 1e-3L;
   const auto rises = [&](Real rho) { return radiusAt(k, rho).slope > 0; };
@@ -216,7 +216,7 @@ Real foldOf(const std::vector<double>& k, Real max_rho) {
   return std::min(max_rho, lastWhere(rises, rho, rho + kStep));
 }
 
-/// The exact inverse of a lens without tangential distortion; nothing beyond its fold.
+/// Returns the exact inverse of a lens without tangential distortion; std::nullopt beyond the fold.
 std::optional<Real> rhoOf(const std::vector<double>& k, Real r, Real fold) {
   if (radiusAt(k, fold).r < r) return std::nullopt;
   return lastWhere([&](Real rho) { return radiusAt(k, rho).r < r; }, 0, fold);
@@ -227,13 +227,13 @@ struct Lens {
   double focal_px;
   DistortionModel distortion;
   std::vector<double> radial;  ///< k1, k2 ...
-  bool covers;                 ///< Every pixel has a ray.
+  bool covers;                 ///< True if every pixel has a ray.
 };
 
 constexpr auto kRadtan = DistortionModel::kRadtan;
 constexpr auto kEquidistant = DistortionModel::kEquidistant;
 
-/// All with the centre between pixels, so that four pixels are alike.
+/// Lenses with the centre between pixels, so that four pixels are equivalent.
 const std::vector<Lens> kLenses = {
     {"no distortion", 226, DistortionModel::kNone, {0, 0, 0}, true},
     {"strong barrel, invertible everywhere", 180, kRadtan, {-0.45, 0.2, 0}, true},
@@ -298,7 +298,7 @@ TEST(LensInverse, RaysAreExactUpToTheFoldAndNoPixelBeyondItHasOne) {
   }
 }
 
-/// The model with a tangential part, forwards.
+/// Returns the distorted ray of the model with tangential distortion.
 Eigen::Vector2d distorted(const std::vector<double>& c, const Eigen::Vector2d& ray) {
   const double x = ray.x();
   const double y = ray.y();
@@ -318,8 +318,8 @@ bool isOnBranch(const std::vector<double>& c, const Eigen::Vector2d& ray) {
   return by_ray.determinant() > 0 && by_ray.trace() > 0;
 }
 
-/// Walks outwards from the centre along many rays as far as the branch goes.
-/// @return per pixel whether the lens projects a ray there.
+/// Steps outwards from the centre along many rays up to the fold.
+/// @return per pixel, whether the lens projects a ray to it.
 cv::Mat1b pixelsSeen(const CameraModel& model) {
   cv::Mat1b seen = cv::Mat1b::zeros(model.height, model.width);
   constexpr int kDirections = 5000;
@@ -365,7 +365,7 @@ TEST(LensInverse, TangentialDistortionIsInvertedOnTheBranchOfTheCentre) {
         const Eigen::Vector2d ray = table.ray(x, y);
         const Eigen::Vector2d pixel = model.project(ray.homogeneous());
         largest_px = std::max(largest_px, (pixel - Eigen::Vector2d(x, y)).norm());
-        // However far from it the search starts.
+        // The result is the same if the search starts far away.
         from_elsewhere += (inverse.rayThrough(x, y, -3 * ray) - ray).norm() < 1e-3 ? 0 : 1;
         if (!table.hasRay(x - 1, y)) continue;
         largest_step = std::max(largest_step, (ray - table.ray(x - 1, y)).norm());

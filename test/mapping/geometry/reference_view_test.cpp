@@ -45,7 +45,7 @@ TEST(DepthPlanes, StepsAreDistancesOfPlanesInInverseDepth) {
       EXPECT_NEAR(inverse.inverseDepthStepAt(way * (count - 1)), step, 1e-12) << way;
     }
   }
-  // 1, 1.5, 2, 2.5 and 3 m: half a plane to either side, as far as there are planes.
+  // 1, 1.5, 2, 2.5 and 3 m: a step spans +-0.5 planes around a position, within the limits.
   const DepthPlanes linear({1.0, 3.0, 5, PlaneSpacing::kLinear});
   EXPECT_NEAR(linear.inverseDepthStep(), 1 - 1 / 1.5, 1e-15);
   EXPECT_NEAR(linear.inverseDepthStepAt(0), (1 - 1 / 1.25) / 0.5, 1e-12);
@@ -66,7 +66,7 @@ TEST(DepthPlanes, LimitsAreInTheirOrderAndInTheRangeOfCameras) {
   EXPECT_EQ(error(0.5, 1'000'001), "max_depth_m = 1000001: must be at most 1000000");
 }
 
-/// Pixels that are not squares, a principal point that is not in the middle.
+/// A camera with non-square pixels and a principal point outside the middle.
 const CameraModel kModel{120, 80, 95.0, 90.0, 62.3, 37.1, DistortionModel::kNone, {}};
 
 Eigen::Vector3d rayOf(const ReferenceView& view, double x, double y) {
@@ -116,7 +116,7 @@ TEST(ReferenceView, TheFieldOfViewIsTheAngleBetweenTheRaysOfLeftAndRightEdge) {
     for (ReferenceViewOptions options : {sized({}, {}), sized(300, {}), sized(200, 200)}) {
       options.fov_deg = fov_deg;
       const ReferenceView view = makeReferenceView(kModel, options);
-      // In the row of the principal point, where rays lie in the plane of x and z.
+      // Rays of the principal point's row lie in the plane of x and z.
       const Eigen::Vector3d left = rayOf(view, -0.5, view.cy);
       const Eigen::Vector3d right = rayOf(view, view.width - 0.5, view.cy);
       const double angle = std::atan2(left.cross(right).norm(), left.dot(right));
@@ -134,7 +134,7 @@ TEST(ReferenceView, OptionsHaveTheirLimits) {
     options.offset_m[axis] = NAN;
     EXPECT_EQ(messageOf([&] { options.validate(); }), "rv_offset_m = nan: must be finite");
   }
-  // At most 2^26 pixels, also where one side follows from the other.
+  // The limit is 2^26 pixels, also if one side is computed from the other side.
   EXPECT_NO_THROW(sized(8192, 8192).validate());
   EXPECT_THROW(sized(8193, 8192).validate(), OptionError);
   EXPECT_NO_THROW(makeReferenceView(kModel, sized(10'032, {})));

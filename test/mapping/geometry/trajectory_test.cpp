@@ -40,7 +40,7 @@ TEST(Trajectory, BetweenPosesInAnyOrderPositionIsLinearAndRotationTheShorterArc)
 }
 
 TEST(Trajectory, HasNoPoseOutsideItAndInGapsButAtTheirEnds) {
-  // A gap of exactly the limit is bridged.
+  // A gap that equals the limit is bridged.
   const Trajectory trajectory =
       trajectoryOf({at(10, 1), at(250'000'010, 2), at(500'000'011, 3), at(900'000'000, 4)}, 0.25);
   EXPECT_FALSE(trajectory.poseAt(9));
@@ -115,7 +115,7 @@ TEST(Trajectory, APartThatIsMovedHasThePosesAroundItsTimesAndTheSameGaps) {
   }
 }
 
-/// A query through a cursor that was left anywhere answers as a search does.
+/// A query with a cursor at any position gives the same answer as a search.
 RC_GTEST_PROP(Trajectory, TheCursorNeverChangesTheAnswer, (const std::set<std::uint16_t>& times)) {
   Trajectory trajectory({1e-6});  // gaps beyond 1000 ns
   for (const auto t : times) trajectory.add(at(t, t));
@@ -173,7 +173,7 @@ TEST(RoundedRotation, IsTheNearestOfMatricesAndQuaternionsThatAreRounded) {
   const auto near = transformNear(T);
   ASSERT_TRUE(near);
   EXPECT_NEAR(near->rotation.norm(), 1, 1e-12);
-  EXPECT_LT(near->rotation.angularDistance(exact.rotation), 1e-3);  // three numbers rounded
+  EXPECT_LT(near->rotation.angularDistance(exact.rotation), 1e-3);  // entries have three digits
   EXPECT_EQ(near->translation, exact.translation);
   EXPECT_TRUE(rotationNear(Eigen::Matrix3d(R * 1.0004)));  // R R^T is off by 8e-4
   EXPECT_FALSE(rotationNear(Eigen::Matrix3d(R * 1.0006)));

@@ -24,7 +24,7 @@ struct Votes {
   std::uint64_t cast = 0;
 };
 
-/// One ray at (x, y) on a plane of 4 x 3 pixels.
+/// Votes with one ray at (x, y) on a plane of 4 x 3 pixels.
 Votes voteAt(float x, float y) {
   Votes result{std::vector<float>(12, 0.0F), 0};
   result.cast = voteBilinear({&x, &y}, {0, 1, 1, 0, 0}, {result.plane.data(), 4, 3});

@@ -31,7 +31,7 @@ FusionMapperOptions period(double window_s = 0.1, double stride_s = 0.1) {
   options.policy.stride_s = stride_s;
   options.keyframe.planes.num_planes = kPlanes;
   options.keyframe.sweep.threads = 1;
-  options.filter.hot_pixels = false;  // most of these recordings are a single pixel's
+  options.filter.hot_pixels = false;  // most of these recordings have one pixel only
   options.fill_last_window = false;
   return options;
 }
@@ -49,13 +49,13 @@ class Mapper : public FusionMapper {
       addCamera({test::smallCamera(), {Eigen::Quaterniond::Identity(), {0.1 * c, 0, 0}}, 0});
     }
   }
-  /// A pose every 10 ms, the last time included.
+  /// Adds a pose every 10 ms, including one at `to_ms`.
   void addPoses(std::int64_t from_ms, std::int64_t to_ms) {
     for (std::int64_t ms = from_ms; ms <= to_ms; ms += 10) {
       addPose({at(ms), {Eigen::Quaterniond::Identity(), {1e-3 * static_cast<double>(ms), 0, 0}}});
     }
   }
-  /// One packet with an event every millisecond.
+  /// Adds one packet with an event every millisecond.
   void addSteady(int camera, std::int64_t from_ms, std::int64_t to_ms) {
     std::vector<Event> events;
     for (std::int64_t ms = from_ms; ms < to_ms; ++ms) events.push_back(eventAt(at(ms)));
@@ -66,7 +66,7 @@ class Mapper : public FusionMapper {
     while (auto keyframe = next()) keyframes.push_back(std::move(*keyframe));
     return keyframes;
   }
-  /// The remaining keyframes at the end of the recording; the counts add up then.
+  /// Returns the remaining keyframes at the end of the recording. Checks the sums of the counts.
   std::vector<KeyframeDepthMap> end() {
     finish();
     std::vector<KeyframeDepthMap> keyframes = takeAll();
@@ -116,12 +116,12 @@ TEST(FusionMapper, EventsOutsideTheLensAreCountedAndReachNoFilterAndNoWindow) {
   Mapper mapper(options, 0);
   mapper.addCamera({test::smallCamera(), {}, 0});
   mapper.addCamera({test::foldingCamera(), {}, 0});
-  mapper.addCamera({test::foldingCamera(), {}, 0});  // takes no part
+  mapper.addCamera({test::foldingCamera(), {}, 0});  // not selected
   mapper.addPoses(0, 300);
   for (int camera = 0; camera < 3; ++camera) {
     std::vector<Event> events;
     for (int ms = 0; ms < 250; ++ms) {
-      events.push_back({at(ms), 0, 0, true});  // hot
+      events.push_back({at(ms), 0, 0, true});  // hot pixel
       events.push_back({at(ms), 23, static_cast<std::uint16_t>(10 + ms % 16), true});
     }
     mapper.addEvents(camera, events);
@@ -295,8 +295,8 @@ TEST(FusionMapper, TheLastWindowIsFullAndEndsWithTheRecording) {
   struct Case {
     const char* what;
     double window_s, stride_s;
-    int poses_ms, events_ms;  // an event every millisecond, a pose every 10 ms, until here
-    std::int64_t limit_ms;    // of the time, or 0
+    int poses_ms, events_ms;  // ends of the poses (every 10 ms) and events (every 1 ms)
+    std::int64_t limit_ms;    // of the time; 0: none
     std::size_t keyframes;
     int last_begin_ms, last_end_ms;  // the events of the last window
     std::uint64_t used;
@@ -335,7 +335,7 @@ TEST(FusionMapper, TheLastWindowIsFullAndEndsWithTheRecording) {
     const auto length_ms = static_cast<int>(1e3 * c.window_s);
     EXPECT_EQ(last.t1_ns - last.t0_ns, length_ms * kMs) << c.what;
     EXPECT_EQ(keyframes.back().events[0], static_cast<std::uint64_t>(length_ms)) << c.what;
-    // Right after its last event, or at a multiple of the stride.
+    // The window ends right after its last event or at a multiple of the stride.
     EXPECT_GT(last.t1_ns, at(c.last_end_ms - 1)) << c.what;
     EXPECT_LE(last.t1_ns, at(c.last_end_ms)) << c.what;
     EXPECT_GT(last.t0_ns, at(c.last_begin_ms - 1)) << c.what;
@@ -356,7 +356,7 @@ TEST(FusionMapper, TheLastWindowReachesNotIntoEventsThatWereDropped) {
   }
 }
 
-/// All numbers in their order.
+/// Returns all numbers in their order.
 std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
   std::vector<std::uint64_t> numbers = {counts.cameras.at(0).read};
   const auto& fates = counts.cameras.at(0).fates.counts;

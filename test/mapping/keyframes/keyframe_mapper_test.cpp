@@ -113,7 +113,7 @@ TEST(KeyframeMapper, ASequenceMaximumThatIsKnownIsTheWhiteLevel) {
 
 TEST(KeyframeMapper, EventImagesCountEveryEventOfTheWindowWithAPoseOrWithout) {
   Recording recording(4, 2, 3000);
-  Trajectory half;  // poses for the first half of the window alone
+  Trajectory half;  // poses of the first half of the window only
   for (const StampedPose& pose : recording.trajectory.poses()) {
     if (pose.t_ns <= Recording::kStart_ns + 60'000'000) half.add(pose);
   }
@@ -142,7 +142,7 @@ TEST(KeyframeMapper, ViewEventsAreTheReferenceCamerasNearestToTheReferenceTimeWi
   KeyframeMapperOptions options = fewPlanes();
   options.reference_camera = 1;
   options.view.width = 60;
-  options.view.fov_deg = 40;  // narrower than the camera's
+  options.view.fov_deg = 40;  // narrower than the camera
   EXPECT_TRUE(map(recording, {0, 1}, options).view_events.empty());
   options.view_events = true;
   EXPECT_TRUE(map(recording, {0}, options).view_events.empty()) << "it is not selected";
@@ -155,7 +155,7 @@ TEST(KeyframeMapper, ViewEventsAreTheReferenceCamerasNearestToTheReferenceTimeWi
   const std::ptrdiff_t half = 48 * 36 / 8 / 2;  // one event per 8 pixels
   const std::vector<Event> nearest(events.begin() + first_after - half,
                                    events.begin() + first_after + half);
-  // All events of a window that has few.
+  // A window with few events uses all of them.
   const std::vector<Event> few(events.begin(), events.begin() + 100);
   for (const std::vector<Event>* shown : {&nearest, &few}) {
     if (shown == &few) events = few;
@@ -211,7 +211,7 @@ TEST(KeyframeMapper, EventsOutsideTheLensAreCountedAndChangeNothing) {
   const std::size_t outside = 6000 - inside.events[0].size() - inside.events[1].size();
   ASSERT_GT(outside, 500U);
   KeyframeMapperOptions options = fewPlanes();
-  options.packets.packet_error_px = 0;  // or packets would be other ones
+  options.packets.packet_error_px = 0;  // otherwise the packets differ
   const KeyframeDepthMap all = map(recording, {0, 1}, options);
   const KeyframeDepthMap expected = map(inside, {0, 1}, options);
   EXPECT_EQ(all.outside_lens, outside);
@@ -237,11 +237,11 @@ TEST(KeyframeMapper, WhatIsNotValidIsNamed) {
   expectError(recording.rig, {}, 0, "cameras: at least one must take part");
   Rig broken = recording.rig;
   broken.cameras[1].model.fx = 0;
-  expectError(broken, {0}, 1, "fx = 0");  // the reference matters although it is not selected
+  expectError(broken, {0}, 1, "fx = 0");  // the reference camera is checked even if not selected
   expectError(broken, {0, 1}, 0, "fx = 0");
   EXPECT_NO_THROW(KeyframeMapper(broken, {0, 2}, fewPlanes()));
 
-  // An event outside the sensor of a camera that takes part.
+  // This event is outside the sensor of a selected camera.
   recording.events[1][50].x = 48;
   KeyframeMapper mapper(recording.rig, {0, 1}, fewPlanes());
   EXPECT_THAT([&] { mapper.map(Recording::kWindow, recording.spans(), recording.trajectory); },
@@ -252,7 +252,7 @@ TEST(KeyframeMapper, WhatIsNotValidIsNamed) {
 
 }  // namespace
 
-// Which of the keyframes along corrected motions is taken; `MotionCorrection` tests the correction.
+// Selection among the keyframes along corrected motions. `MotionCorrection` tests the correction.
 
 namespace {
 
@@ -263,11 +263,11 @@ struct NoSink : DsiSink {
 TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
   const struct {
     const char* what;
-    std::vector<double> sharpness;  // of each keyframe, the first along the tracked motion
+    std::vector<double> sharpness;  // per keyframe; the first has the tracked motion
     int rounds;
     double min_gain;
     bool with_sink;
-    int taken;  // its index
+    int taken;  // index of the selected keyframe
     int mapped;
   } cases[] = {
       {"too little", {1, 1.09, 5}, 3, 0.1, false, 0, 2},
@@ -281,7 +281,7 @@ TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
   const test::RandomRecording recording(1, 1, 10);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
   const DepthPlanes planes;
-  const std::vector<CameraEvents> no_cameras;  // so that the correction is none
+  const std::vector<CameraEvents> no_cameras;  // without cameras there is no correction
   for (const auto& c : cases) {
     SCOPED_TRACE(c.what);
     MotionCorrectionOptions options;
@@ -319,7 +319,7 @@ TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
   }
 }
 
-/// Writes down where stages begin and end.
+/// Records the begins and ends of stages.
 struct StageLog : StageHook {
   std::string stages;
   void begin(Stage stage) override { stages += "fsd"[static_cast<int>(stage)]; }

@@ -15,7 +15,7 @@
 
 namespace efm::test {
 
-/// A recording of one camera that is known up to some time.
+/// A recording of one camera that is complete until `complete_ns`.
 class KnownRecording : public RecordingProgress {
  public:
   std::int64_t start_ns = 0;
@@ -80,7 +80,7 @@ TEST(KeyframePolicy, WindowsThatAreDroppedPieceByPieceCountOnce) {
   options.window_events = 100;
   Recording recording = startingAt(0);
   for (int ms = 0; ms < 2000; ++ms) recording.events_ns.push_back(ms * kMs);
-  recording.complete_ns = 0;  // as without poses: no window is known
+  recording.complete_ns = 0;  // like without poses: no window is complete
   for (const auto kind :
        {KeyframePolicyKind::kPeriod, KeyframePolicyKind::kEvents, KeyframePolicyKind::kBaseline}) {
     options.policy = kind;
@@ -93,7 +93,7 @@ TEST(KeyframePolicy, WindowsThatAreDroppedPieceByPieceCountOnce) {
     EXPECT_EQ(policy->dropWindowsBefore(recording, 1501 * kMs), 5U) << nameOf(kind);
     policy->advance({1501 * kMs, 1601 * kMs, 1501 * kMs}, nullptr);
     EXPECT_EQ(policy->dropWindowsBefore(recording, 1701 * kMs), 1U) << nameOf(kind);
-    if (kind == KeyframePolicyKind::kPeriod) continue;  // its windows do not depend on events
+    if (kind == KeyframePolicyKind::kPeriod) continue;  // kPeriod windows do not depend on events
     policy->dropWindowsBefore(recording, 2000 * kMs);
     EXPECT_EQ(policy->dropWindowsBefore(recording, 9000 * kMs), 0U) << "there is no event";
   }
@@ -147,7 +147,7 @@ Rigid3 turned(double angle_rad) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY())),
           Eigen::Vector3d::Zero()};
 }
-/// An event per millisecond for four seconds; a view of 53 degrees.
+/// Returns a recording with an event per millisecond for four seconds and a view of 53 degrees.
 KnownRecording recordingOf(std::function<std::optional<Rigid3>(std::int64_t)> T_world_ref) {
   KnownRecording recording;
   recording.start_ns = kBaselineStart_ns;
@@ -165,7 +165,7 @@ KeyframePolicyOptions options(double window_s, double stride_s) {
   return options;
 }
 
-/// A keyframe at the origin that saw points at one depth all over its image.
+/// Returns a keyframe at the origin with points at one depth in its whole image.
 KeyframeDepthMap keyframeThatSaw(double depth_m) {
   KeyframeDepthMap keyframe;
   keyframe.view = KnownRecording().image;
@@ -189,9 +189,9 @@ TEST(BaselinePolicy, RotationEndsAWindowOnceTooFewPointsAreInView) {
         policy->advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
       const auto window = policy->current(recording);
       ASSERT_TRUE(window);
-      // 30 of 100 columns have left after atan(0.495) - atan(0.195) = 0.267 rad, four of the
-      // guess's ten after atan(0.495) - atan(0.1485) = 0.312; of 80 rows 24 after 0.222 rad, and
-      // four of ten after 0.258. A stride is 0.01. Corners leave a little before.
+      // 30 of 100 columns are out of view after atan(0.495) - atan(0.195) = 0.267 rad, four of the
+      // guess's ten after atan(0.495) - atan(0.1485) = 0.312 rad. 24 of 80 rows are out after 0.222
+      // rad, four of ten after 0.258 rad. A stride is 0.01 rad. Corners leave a little earlier.
       const double least =
           by_the_keyframe ? (sideways ? 0.267 : 0.222) : (sideways ? 0.312 : 0.258);
       const double angle = 0.5 * secondsSinceStart(window->t1_ns);
@@ -224,7 +224,7 @@ TEST(BaselinePolicy, RestAfterARotationMakesOneKeyframeNotOnePerStride) {
   const auto policy = makeKeyframePolicy(options(1.0, 0.05), kDepthGuess_m);
   const KeyframeDepthMap seen = keyframeThatSaw(2);
   policy->advance({kBaselineStart_ns, kBaselineStart_ns, kBaselineStart_ns}, &seen);
-  // The camera looks away from these points and is at rest: there is nothing to triangulate.
+  // The camera looks away from these points and is at rest: nothing can be triangulated.
   const auto recording = recordingOf([](std::int64_t) { return turned(3.1); });
   const auto window = policy->current(recording);
   ASSERT_TRUE(window);
@@ -236,7 +236,7 @@ TEST(BaselinePolicy, RestAfterARotationMakesOneKeyframeNotOnePerStride) {
       << "its events are let go";
 }
 
-/// `WindowPolicies` has the other conditions.
+/// `WindowPolicies` tests the other conditions.
 TEST(BaselinePolicy, ALastWindowOfWhichLittleIsNewIsLeftOut) {
   const auto moving = recordingOf([](std::int64_t t_ns) {
     return Rigid3{Eigen::Quaterniond::Identity(), {0.9 * secondsSinceStart(t_ns), 0, 0}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The keyframe mapper as it comes (split fusion and aggregated depth), and on known points.
+// The keyframe mapper: default options (split fusion, aggregated depth) and known points.
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
 #include <tbb/task_scheduler_observer.h>
@@ -91,7 +91,7 @@ TEST_P(KeyframeDefaultsOn, TheNumberOfThreadsChangesNoBit) {
   }
 }
 
-/// Counts the workers that come to the thread that it is made on.
+/// Counts the workers that join the arena of the thread that constructs this object.
 class WorkersThatCome : public tbb::task_scheduler_observer {
  public:
   WorkersThatCome() { observe(true); }
@@ -122,12 +122,12 @@ TEST(KeyframeDefaults, ASilentCameraSilencesTheMapUnlessItIsExcluded) {
   EXPECT_EQ(keyframe.max_confidence, 0);
   EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
   EXPECT_EQ(keyframe.silent_subintervals, 0U) << "of the cameras that are not silent";
-  // Then the slices of the single remaining camera are fused like cameras.
+  // If the silent camera is excluded, the slices of the remaining camera are fused like cameras.
   KeyframeMapperOptions options = defaults();
   options.exclude_silent = true;
   options.camera_maps = true;
   const KeyframeDepthMap excluded = map(recording, options);
-  options.split.time_slices = 2;  // as of the two that were selected
+  options.split.time_slices = 2;  // as with two selected cameras
   const KeyframeDepthMap alone = map(recording, {0}, options);
   EXPECT_GT(cv::countNonZero(alone.map.depth), 400);
   EXPECT_TRUE(same(excluded.map, alone.map));
@@ -155,7 +155,7 @@ TEST(KeyframeDefaults, WithEveryCameraSilentTheMapIsEmpty) {
 TEST(KeyframeDefaults, SilentSubintervalsAreCountedInAllSlicesButNotByPolarity) {
   test::RandomRecording recording(9, 2, 3000);
   for (Event& event : recording.events[0]) event.polarity = false;
-  // The second camera sees nothing in the third and fourth of six parts.
+  // The second camera has no events in the third and fourth of six parts.
   auto& events = recording.events[1];
   events.erase(std::remove_if(events.begin(), events.end(),
                               [](const Event& event) {
@@ -210,7 +210,7 @@ CameraModel camera240() {
   return {240, 180, 200, 198, 121.5, 88.2, DistortionModel::kRadtan, {-0.1, 0.05, 0.0005, -0.0003}};
 }
 
-/// Three cameras that move half a metre to the right in all, turning a little.
+/// Three cameras that move to the right by half a metre in total and turn a little.
 struct MovingRig {
   Rig rig;
   Trajectory trajectory;
@@ -232,7 +232,7 @@ struct MovingRig {
   Rigid3 T_world_cam(std::size_t camera, std::int64_t t_ns) const {
     return *trajectory.poseAt(t_ns) * rig.cameras[camera].T_rig_cam;
   }
-  /// The raw pixel that sees a point, where one does.
+  /// Returns the raw pixel of a point; std::nullopt outside the sensor.
   std::optional<cv::Point> pixelOf(std::size_t camera, std::int64_t t_ns,
                                    const Eigen::Vector3d& p_world) const {
     const CameraModel& model = rig.cameras[camera].model;
@@ -269,7 +269,7 @@ struct KnownPoint {
   double depth_m = 0;
 };
 
-/// Points apart from each other that both cameras see all the time.
+/// Draws points with a distance from each other that both cameras always see.
 std::vector<KnownPoint> randomPoints(const MovingRig& moving, const ReferenceView& view,
                                      const Rigid3& T_world_ref) {
   test::RandomScene random(2);
@@ -288,8 +288,8 @@ std::vector<KnownPoint> randomPoints(const MovingRig& moving, const ReferenceVie
   return points;
 }
 
-/// 60 planes, each 1.7 pixels of parallax from the next over the whole motion: that events are
-/// rounded to pixels does not move a peak by a plane.
+/// Planes are 1.7 pixels of parallax apart over the whole motion: rounding of events to pixels does
+/// not move a peak by a plane.
 constexpr int kPlanes = 60;
 const double kPlaneStep = (1 / 0.8 - 1 / 4.0) / (kPlanes - 1);
 
@@ -339,13 +339,13 @@ struct Found {
   KeyframeDepthMap keyframe;
 };
 
-/// The reference view and its pose are computed here, independent of the mapper.
+/// Maps known points. The reference view and its pose are computed independently of the mapper.
 Found mapPoints(const ViewCase& view_case) {
   const MovingRig moving;
   KeyframeMapperOptions options;
   options.planes = {0.8, 4.0, kPlanes, PlaneSpacing::kInverse};
-  // Around a point that stands alone, pixels beside it see its rays cross a little nearer and a
-  // little farther: their median says nothing of the point.
+  // No median is used: in pixels beside an isolated point, its rays cross a little nearer or
+  // farther than the point.
   options.extraction.median_size = 1;
   view_case.change(options);
   const Window window = windowOf(kStart_ns, kStart_ns + kDuration_ns, view_case.reference);
@@ -393,7 +393,7 @@ TEST(KnownPoints, HaveErrorsWithinTheirVariance) {
     squared_errors += std::pow(1 / found.keyframe.map.depth(point.pixel) - 1 / point.depth_m, 2);
     variances += variance;
   }
-  // Nothing but rounding is wrong with these events: real ones err more.
+  // The errors of these events are rounding only: real events have larger errors.
   EXPECT_GT(variances, squared_errors);
   EXPECT_LT(variances, 100 * squared_errors);
 }

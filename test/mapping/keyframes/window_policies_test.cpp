@@ -20,7 +20,7 @@ using test::Played;
 using test::playedOptions;
 using test::same;
 
-/// One of each policy, windows that overlap and windows that leave gaps among them.
+/// Returns options of each policy, including windows that overlap and windows with gaps.
 std::vector<FusionMapperOptions> allPolicies() {
   std::vector<FusionMapperOptions> all(7, playedOptions());
   all[0].policy.window_s = 0.11;
@@ -50,7 +50,7 @@ std::string labelOf(const FusionMapperOptions& options, std::uint32_t seed) {
   return std::string(nameOf(options.policy.policy)) + ", seed " + std::to_string(seed);
 }
 
-/// Plays the recording as a whole and in three other ways. @return the number of keyframes.
+/// Plays the recording as a whole and cut in three ways. @return the number of keyframes.
 std::size_t expectTheSameHoweverCut(const LongRecording& recording,
                                     const FusionMapperOptions& options, const std::string& label) {
   const Played whole = play(recording, options, 0);
@@ -95,11 +95,11 @@ TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithFewEventsLateCamerasA
   std::size_t keyframes = 0;
   for (FusionMapperOptions options : allPolicies()) {
     for (std::uint32_t seed = 1; seed <= 40; ++seed) {
-      // An event of each camera in 6 or 20 ms: poses and other cameras often end between two.
+      // Each camera has an event per 20 or 6 ms: data of others often end between two events.
       const bool few = seed % 2 == 0;
       options.policy.window_events = few ? 3 : 40;
       LongRecording recording(seed, 1.0, few ? 30 : 100);
-      // Camera 1 begins anywhere: often in the gap of the poses, after camera 0 has started.
+      // Camera 1 begins at any time: often in the gap of the poses, after the begin of camera 0.
       std::vector<Event>& late = recording.events[1];
       late.erase(late.begin(),
                  late.begin() + static_cast<std::ptrdiff_t>(seed * 7 % (few ? 20 : 80)));
@@ -110,13 +110,13 @@ TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithFewEventsLateCamerasA
   EXPECT_GE(keyframes, 500U);
 }
 
-/// The keyframes whose windows contain an event, and those that chose it.
+/// Numbers of keyframes whose windows contain an event, and of keyframes that used the event.
 struct Choices {
   std::uint64_t windows = 0;
   std::uint64_t chosen = 0;
 };
 
-/// Of each event of a camera.
+/// Returns the choices of each event of a camera.
 std::vector<Choices> choicesOf(const LongRecording& recording, std::size_t camera,
                                const FusionMapperOptions& options,
                                const std::vector<KeyframeDepthMap>& keyframes) {
@@ -184,7 +184,7 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
       << "there is some of everything";
 }
 
-/// Times of all events of the selected cameras from the first one with a pose on, in order.
+/// Returns the sorted times of the selected cameras' events, from the first event with a pose on.
 std::vector<std::int64_t> eventTimes(const LongRecording& recording) {
   const Trajectory trajectory = recording.trajectory();
   std::vector<std::int64_t> times;
@@ -198,7 +198,7 @@ std::vector<std::int64_t> eventTimes(const LongRecording& recording) {
   return {start, times.end()};
 }
 
-/// The time of the last event that has a pose before the last one.
+/// Returns the time of the last event that has a pose and is before the last pose.
 std::int64_t lastPosed(const std::vector<std::int64_t>& times, const LongRecording& recording) {
   const Trajectory trajectory = recording.trajectory();
   const auto last = std::find_if(times.rbegin(), times.rend(), [&](std::int64_t t_ns) {
@@ -207,7 +207,7 @@ std::int64_t lastPosed(const std::vector<std::int64_t>& times, const LongRecordi
   return *last;
 }
 
-/// Those that have a pose at their reference time are mapped, and the others are counted.
+/// Expects that windows with a pose at their reference time are mapped, and others are counted.
 void expectWindows(const Played& played, const std::vector<Window>& windows,
                    const Trajectory& trajectory) {
   std::size_t k = 0;
@@ -237,17 +237,17 @@ TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOtherAndTheLastIsMov
       auto first = times.begin();
       while (times.end() - first >= static_cast<std::ptrdiff_t>(count)) {
         const std::int64_t last_ns = *(first + static_cast<std::ptrdiff_t>(count) - 1);
-        if (last_ns >= last_pose_ns) break;  // the poses don't cover it
+        if (last_ns >= last_pose_ns) break;  // not within the poses
         windows.push_back({*first, last_ns + 1, *first + (last_ns + 1 - *first) / 2});
-        first = std::upper_bound(first, times.end(), last_ns);  // equal times belong to it too
+        first = std::upper_bound(first, times.end(), last_ns);  // includes equal times
       }
       EXPECT_GE(windows.size(), 2U);
-      if (count == 1) windows.resize(10);  // each keyframe costs something
+      if (count == 1) windows.resize(10);  // fewer keyframes, for speed
       if (count == 1) options.limits.t1_ns = windows.back().t1_ns;
       const std::int64_t end_ns = lastPosed(times, recording) + 1;
       const auto end = std::lower_bound(times.begin(), times.end(), end_ns);
       const auto unmapped = static_cast<std::size_t>(end - std::min(first, end));
-      if (count > 1 && 10 * unmapped >= count) {  // the last ones that are that many
+      if (count > 1 && 10 * unmapped >= count) {  // the last `count` events
         const std::int64_t t0_ns = *(end - static_cast<std::ptrdiff_t>(count));
         windows.push_back({t0_ns, end_ns, t0_ns + (end_ns - t0_ns) / 2});
         ++moved_back;
@@ -294,7 +294,7 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
       for (int strides = 1; strides <= 8 && centre(t0_ns); ++strides) {
         const std::int64_t t1_ns = t0_ns + strides * std::int64_t{12'000'000};
         over = t1_ns > recording.poses.back().t_ns;
-        if (over) from_ns = t0_ns;  // not decided
+        if (over) from_ns = t0_ns;  // not decided yet
         if (over) break;
         if (!centre(t1_ns) || (*centre(t1_ns) - *centre(t0_ns)).norm() < 0.04 * mean_depth_m) {
           continue;
@@ -309,7 +309,7 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
         break;
       }
     }
-    // From the end back, stride by stride, until the motion is enough.
+    // The begin moves back from the end, stride by stride, until the motion is enough.
     const std::int64_t end_ns = lastPosed(times, recording) + 1;
     const auto rest = std::lower_bound(times.begin(), times.end(), from_ns);
     if (rest != times.end() && *rest < end_ns) {
@@ -348,11 +348,11 @@ TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
     mapper.addEvents(0, random.events(test::smallCamera(), 100, t_ns, 10 * kMs));
     EXPECT_FALSE(mapper.next());
     const EventCounts counts = mapper.counts().total();
-    // Held: the longest window, a stride, the delay that events may have and the last packet.
+    // Kept events: the longest window, a stride, the allowed delay of events and the last packet.
     EXPECT_LE(counts.read - counts[EventFate::kOutsideWindow], 10U * (100 + 20 + 10 + 10));
     EXPECT_LE(mapper.trajectory().poses().size(), 2U * (14 + 2)) << "freed by the half";
   }
-  // Then the camera moves: 1 m/s and a mean depth of 8/9 m make 10 % in 89 ms.
+  // Then the camera moves at 1 m/s: 10 % of the mean depth of 8/9 m in 89 ms.
   std::vector<KeyframeDepthMap> keyframes;
   for (int packet = 500; packet < 540; ++packet) {
     const std::int64_t t_ns = LongRecording::kStart_ns + packet * 10 * kMs;

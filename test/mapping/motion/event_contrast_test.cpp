@@ -33,7 +33,7 @@ TEST(VelocityCorrection, ADisplacementIsManySmallOnes) {
 
 TEST(VelocityCorrection, SmallRotationsAreAsExactAsLargeOnes) {
   const Eigen::Vector3d linear_m_s(1, 2, 3);
-  for (const double rate : {0.999e-4, 1.001e-4}) {  // either side of where the series ends
+  for (const double rate : {0.999e-4, 1.001e-4}) {  // on both sides of the end of the series
     const Rigid3 T_rig_true = VelocityCorrection{linear_m_s, {rate, 0, 0}}.displacement(1);
     EXPECT_NEAR(T_rig_true.rotation.x(), std::sin(rate / 2), 1e-18);
     EXPECT_NEAR(T_rig_true.translation.y(), 2 - 3 * rate / 2, 1e-8);
@@ -49,7 +49,7 @@ TEST(VelocityCorrection, PosesMoveByTheDisplacementSinceTheReference) {
                      recording.trajectory.poseAt(window.t_ref_ns).value()));
   for (std::int64_t t_ns = window.t0_ns; t_ns < window.t1_ns; t_ns += 3 * kMs) {
     const double since_s = 1e-9 * static_cast<double>(t_ns - window.t_ref_ns);
-    // Between poses 5 ms apart, rotated by at most 0.01, the line differs a little from the screw.
+    // Between poses (5 ms, up to 0.01 rad), interpolation differs a little from a screw motion.
     expectNear(corrected.poseAt(t_ns).value(),
                recording.trajectory.poseAt(t_ns).value() * correction.displacement(since_s), 2e-6);
   }
@@ -77,7 +77,7 @@ TEST(NearestDepths, WithoutADepthThereIsNone) {
   EXPECT_EQ(depths.inverseDepth({3, 3}), 0);
 }
 
-/// A recording, a camera of it, and depths in its reference view.
+/// A recording, one of its cameras, and depths in the reference view.
 struct Warping {
   RandomRecording recording{5, 1, 400};
   const RigCamera& camera = recording.rig.cameras.front();
@@ -96,7 +96,7 @@ struct Warping {
         {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
   }
 
-  /// The point where an event's ray meets a plane of the reference view.
+  /// Returns the intersection of an event's ray with a plane of the reference view, in pixels.
   Eigen::Vector2d pixelAt(const Event& event, double depth_m, const Rigid3& T_world_rig) const {
     const Rigid3 T_ref_cam = T_world_ref.inverse() * T_world_rig * camera.T_rig_cam;
     const Eigen::Vector3d far_ref =
@@ -143,7 +143,7 @@ TEST(WarpedEvents, OfSeveralDepthsOnItsRayAnEventHasTheNearestToAPixelWithIt) {
   beside.T_rig_cam = beside.T_rig_cam * Rigid3{Eigen::Quaterniond::Identity(), {0.2, 0, 0}};
   const Event event{warping.window.t_ref_ns, 16, 18, true};
   const Eigen::Vector2d ray = warping.undistortion.ray(event.x, event.y);
-  for (const double right : {1.0, 0.0, -1.0}) {  // the pixel of the nearer depth is off by this
+  for (const double right : {1.0, 0.0, -1.0}) {  // offset of the pixel of the nearer depth
     cv::Mat1f depth = cv::Mat1f::zeros(36, 48);
     for (const double depth_m : {0.8, 2.0}) {
       const Eigen::Vector2d pixel = warping.view.project(
@@ -276,8 +276,8 @@ TEST(EventContrast, TheGradientIsTheNumericOne) {
     const Eigen::VectorXd place = Eigen::VectorXd::Constant(contrast.variables(), 0.01);
     contrast.at(place, gradient);
     for (Eigen::Index i = 0; i < contrast.variables(); ++i) {
-      // Large against the rounding of floats; small against the pixels that events cross, where
-      // bilinear images have kinks, which smoothing hardly leaves to be seen.
+      // The step is large against the rounding of floats. It is small against a pixel, because
+      // bilinear images have kinks at pixels; smoothing nearly removes the kinks.
       constexpr double kStep = 5e-3;
       Eigen::VectorXd step = Eigen::VectorXd::Zero(contrast.variables());
       step[i] = kStep;
@@ -290,8 +290,7 @@ TEST(EventContrast, TheGradientIsTheNumericOne) {
 }
 
 TEST(EventContrast, IsTheSquareOfTheHarmonicMeanOfSmoothImages) {
-  // One, two and three events of three cameras in one place: inside, and in the corners of the
-  // view.
+  // Three cameras have one, two and three events at one point: inside and in corners of the view.
   WarpedEvent event;
   event.by_velocity.setZero();
   event.by_inverse_depth.setZero();
@@ -305,7 +304,7 @@ TEST(EventContrast, IsTheSquareOfTheHarmonicMeanOfSmoothImages) {
     for (const double blur_px : {1.0, 2.0}) {
       EventContrast contrast(events, kView, kPatchPx);
       contrast.setBlur(blur_px);
-      const int side = blur_px == 1 ? 7 : 13;  // three standard deviations to either side
+      const int side = blur_px == 1 ? 7 : 13;  // three standard deviations on each side
       cv::Mat1f smooth;
       cv::GaussianBlur(image, smooth, {side, side}, blur_px, blur_px, cv::BORDER_CONSTANT);
       Eigen::VectorXd gradient;

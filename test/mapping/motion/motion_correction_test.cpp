@@ -25,7 +25,7 @@ TEST(QuasiNewton, FindsTheBottomOfRosenbrocksValley) {
     return (1 - at[0]) * (1 - at[0]) + 100 * off * off;
   };
   QuasiNewtonOptions options;
-  options.max_evaluations = 60;  // a wrong Hessian takes hundreds
+  options.max_evaluations = 60;  // a wrong Hessian needs hundreds
   options.min_step = 1e-12;
   const Eigen::VectorXd found = minimise(valley, Eigen::Vector2d(-1.2, 1), options);
   EXPECT_NEAR(found[0], 1, 1e-5);
@@ -66,7 +66,7 @@ TEST(QuasiNewton, StaysOnAFlatFunctionAndGoesOnDownASlope) {
 
 }  // namespace
 
-// Whole keyframes along corrected motions. How well the correction does: test/integration.
+// Whole keyframes along corrected motions. test/integration tests the quality of the correction.
 
 namespace {
 
@@ -83,7 +83,7 @@ KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   return options;
 }
 
-/// Edges as seen by a tracker that turns and slides.
+/// Returns edges with a tracker that has errors of linear and angular velocity.
 MovingEdges blurred(int cameras) {
   MovingEdges recording(cameras);
   recording.trajectory = correctedTrajectory(recording.trajectory, MovingEdges::kWindow,
@@ -101,7 +101,7 @@ void expectSame(const KeyframeDepthMap& a, const KeyframeDepthMap& b) {
   EXPECT_EQ(a.T_world_ref.rotation.coeffs(), b.T_world_ref.rotation.coeffs());
 }
 
-/// Counts how often each plane comes.
+/// Counts the calls per plane.
 class PlaneCounter : public DsiSink {
  public:
   std::vector<int> times = std::vector<int>(60);
@@ -139,8 +139,8 @@ TEST(MotionCorrection, ABlurredKeyframeIsMappedAlongTheCorrectedMotionAndBecomes
   }
 }
 
-/// Recordings without information about the motion: the keyframe is the uncorrected one, bit for
-/// bit.
+/// If recordings have no information about the motion, the keyframe has the bits of the uncorrected
+/// keyframe.
 TEST(MotionCorrection, WithoutInformationTheKeyframeStays) {
   struct Case {
     const char* what;
@@ -186,7 +186,7 @@ TEST(MotionCorrection, ASilentCameraAndASinglePlaneDoNoHarm) {
 }
 
 TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
-  // Edges that a wrong velocity along one axis blurs by up to 4 px, as both cameras see them.
+  // Events of edges in both cameras, blurred by up to 4 px by a wrong velocity along one axis.
   const auto blurred_by = [](int axis, float velocity) {
     std::vector<WarpedEvent> events;
     for (int i = 0; i < 400; ++i) {
@@ -213,7 +213,7 @@ TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
   EXPECT_NEAR(found(0.1, 0.1, 0), 0.1, 0.02);
   EXPECT_NEAR(found(0.1, 0.1, 4), 0.1, 0.02);
   for (const int axis : {1, 2, 3, 5}) EXPECT_NEAR(found(0.1, 0.1, axis), 0.1, 0.02) << axis;
-  // A thousandth holds the velocity back, a twentieth does not.
+  // A sigma of 1/1000 of the velocity keeps it near 0, a sigma of 1/20 does not.
   EXPECT_LT(std::abs(found(1e-4, 0.1, 0)), 0.03);
   EXPECT_LT(std::abs(found(0.1, 1e-4, 4)), 0.03);
   EXPECT_GT(found(0.005, 0.1, 0), 0.06);

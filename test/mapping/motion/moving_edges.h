@@ -64,7 +64,7 @@ struct MovingEdges {
   }
   std::vector<EventSpan> spans() const { return {events.begin(), events.end()}; }
 
-  /// Returns the distance (px) of a pixel of camera 0 at the reference time from the nearest edge
+  /// Returns the distance (px) from a pixel of camera 0 at the reference time to the nearest edge
   /// at depth `z_m`. The inverse depth of the edge may differ by `tolerance` (1/m).
   double offEdge(double x_px, double y_px, double z_m, double tolerance) const {
     double nearest = INFINITY;

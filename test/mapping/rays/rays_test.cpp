@@ -49,7 +49,7 @@ TEST(VoteGrid, ACornerOutsideTheLensStandsForTheNextPixelInside) {
   ReferenceView view = ReferenceView::of(model);
   const GridVotes votes =
       VoteGrid(undistortion, view, kNearPlane_m, kFarPlane_m).votesFrom(Rigid3());
-  // A vote without motion is at its ray: the corner's is the last one that the lens sees.
+  // A vote without motion is at its ray. The corner's vote is at the last ray of the lens.
   const double corner = std::hypot(votes.x[0] - model.cx, votes.y[0] - model.cy);
   double largest = 0;
   for (int x = 0; x < model.width; ++x) {
@@ -64,7 +64,7 @@ TEST(VoteGrid, ACornerOutsideTheLensStandsForTheNextPixelInside) {
   }
 }
 
-/// Votes in front of the camera and near the view, the first of them at (x, y).
+/// Returns votes in front of the camera and near the view. The first vote is at (x, y).
 GridVotes votesWithOneAt(double x, double y) {
   GridVotes votes;
   votes.in_front.fill(true);
@@ -74,14 +74,14 @@ GridVotes votesWithOneAt(double x, double y) {
   return votes;
 }
 
-/// An interval of 100 us in which one vote moves 10 px along x, a little faster towards the end.
+/// Measures the displacement of votes in an interval of 100 us.
 std::optional<VoteDisplacement> accelerated(const std::array<GridVotes, 3>& votes) {
   return VoteDisplacement::measure(kGridStart_ns, kGridStart_ns + 100'000,
                                    {&votes[0], &votes[1], &votes[2]});
 }
 
 TEST(VoteDisplacement, IsExactAlongAParabola) {
-  // 9.5 t + 0.5 t^2 and back again with t from 0 to 1, along either axis.
+  // The vote moves by 9.5 t + 0.5 t^2 px (t from 0 to 1), forth or back, along x or y.
   for (const bool along_x : {true, false}) {
     for (const bool back : {false, true}) {
       const auto way = [&](double t) {
@@ -175,7 +175,7 @@ Eigen::Vector2d meet(const Recording& recording, const Rigid3& T_ref_cam, const 
   return recording.geometry.view.project(T_ref_cam.translation + along * direction);
 }
 
-/// The largest error of an event's vote on any plane with its packet's pose.
+/// Returns the largest error (pixels) of an event's vote on any plane with its packet's pose.
 double misplacement(const Recording& recording, const PosePacket& packet, const Event& event) {
   const Rigid3 T_ref_cam = recording.geometry.T_ref_world *
                            *recording.trajectory.poseAt(event.t_ns) * recording.camera.T_rig_cam;
@@ -192,9 +192,9 @@ double misplacement(const Recording& recording, const PosePacket& packet, const 
   return max_px;
 }
 
-/// Expects that no vote is misplaced by more than a bound, and that packets have all events.
+/// Expects that votes are misplaced by at most `error_px`, and that packets have all events.
 void expectWithin(const Recording& recording, double error_px) {
-  // Between the rays that are measured the motion field bends by a few percent.
+  // The motion field bends by a few percent between the measured rays.
   constexpr double kBend = 1.05;
   const PosePackets packets = split(recording, error_px);
   EXPECT_EQ(packets.without_pose, 0U);
@@ -227,7 +227,7 @@ TEST(PosePackets, ACameraThatRotatesAroundANearPointIsBoundedFarAwayToo) {
   recording.camera.T_rig_cam = {};
   recording.trajectory = Trajectory();
   for (int i = 0; i <= 20; ++i) {
-    // On a circle around the point 0.5 m ahead of the first pose, always looking at it.
+    // The camera circles a point 0.5 m ahead of the first pose and always looks at the point.
     const Eigen::Quaterniond rotation = rotationBy({0, 0.01 * i, 0});
     const Eigen::Vector3d centre(0, 0, kNear_m);
     recording.trajectory.add({kStart_ns + i * 5'000'000, {rotation, centre - rotation * centre}});
@@ -250,8 +250,8 @@ TEST(PosePackets, FewPosesAndLargeRotationsBetweenThemKeepTheBound) {
   for (const double error_px : {0.05, 1.0}) expectWithin(recording, error_px);
 }
 
-/// The number of packets if each is measured by itself, at its middle and both ends, never by the
-/// speed in a longer interval.
+/// Returns the number of packets if each packet is measured alone, at its middle and both ends,
+/// without the speed in a longer interval.
 std::size_t packetsMeasuredOneByOne(const Recording& recording, double error_px, std::size_t begin,
                                     std::size_t end) {
   const VoteGrid grid(recording.undistortion, recording.geometry.view, kNear_m, kFar_m);
@@ -364,14 +364,14 @@ TEST(BackProjection, TheTransferMeetsEveryPlaneWhereTheRayItselfDoes) {
         const Eigen::Vector2d exact = view.project(T_ref_cam.translation + along * direction);
         const Eigen::Vector2d transferred(transfer.scale * rays.x_inf[i] + transfer.offset_x,
                                           transfer.scale * rays.y_inf[i] + transfer.offset_y);
-        // Coordinates on the plane at infinity are floats, and computed in them.
+        // Coordinates on the plane at infinity are floats and computed in float.
         EXPECT_NEAR((transferred - exact).norm(), 0, 2e-6 * (10 + exact.norm()));
       }
     }
   }
 }
 
-/// A camera with a sensor of 1280 x 720 pixels.
+/// A camera with 1280 x 720 pixels.
 struct HdCamera {
   CameraModel model{1280,
                     720,
@@ -404,8 +404,8 @@ TEST(BackProjection, FloatsAreOffByLessThanAThousandthOfAPixelAtHd) {
       const Eigen::Vector2d computed(rays.x_inf[i], rays.y_inf[i]);
       largest_px = std::max(largest_px, (computed - exact).norm());
     }
-    // Six roundings of 2^-24 each, of numbers up to 1280: 5e-4 where they all add up. A thousandth
-    // is a twentieth of the error that sharing poses may cause.
+    // Six roundings of 2^-24 of numbers up to 1280 add up to at most 5e-4 px. 1e-3 px is a
+    // twentieth of the error that shared poses may cause.
     EXPECT_LT(largest_px, 1e-3);
     EXPECT_GT(largest_px, 1e-6) << "something was compared";
   }
@@ -415,8 +415,8 @@ TEST(BackProjection, RaysParallelToThePlanesAreNotFinite) {
   CameraModel model = test::smallCamera();
   model.distortion = DistortionModel::kNone;
   model.coefficients.clear();
-  model.cx = 20;  // this column looks along z exactly
-  // Half a rotation around (x + z) maps the z axis to the x axis.
+  model.cx = 20;  // rays of this column have x = 0
+  // A rotation by 180 deg around (x + z) maps the z axis to the x axis.
   const Rigid3 T_ref_cam{Eigen::Quaterniond(0, std::sqrt(0.5), 0, std::sqrt(0.5)),
                          Eigen::Vector3d::Zero()};
   const std::vector<Event> events = onePerPixel(model);

@@ -31,8 +31,8 @@ TEST(OptionChoice, LimitsEncloseTheScene) {
     EXPECT_TRUE(chosen.found_scene);
     EXPECT_EQ(chosen.options.size(), 5U);
     const DepthPlanesOptions& planes = options.keyframe.planes;
-    // Around the edges from 1 to 3 m; of those from 3 to 9 m the limit is near the far end, because
-    // the parallax is too small beyond.
+    // The limits enclose edges from 1 to 3 m. For edges from 3 to 9 m, the far limit is close to
+    // the far end, because the parallax is too small beyond.
     EXPECT_NEAR(planes.min_depth_m, factor == 1 ? 0.45 : 1.6, 0.03 * factor);
     EXPECT_NEAR(planes.max_depth_m, factor == 1 ? 3.8 : 12, 0.2 * factor);
     EXPECT_EQ(planes.num_planes, automaticPlanes(planes, chosen.parallax_px_m));
@@ -52,7 +52,7 @@ TEST(OptionChoice, TheWindowIsBoundByTheRecordingTheMotionAndASecond) {
       {slow, 3.1, 0.77, "the recording lasts 3.1 s"},
       {slow, 8.0, 1, "the longest that is chosen: the view moves slowly"},
       {slow, std::nullopt, 1, "the longest that is chosen: the view moves slowly"},
-      // 0.2 of 160 px are 0.267 rad with 120 px of focal length: 0.533 s, in steps of 1.25.
+      // 0.2 of 160 px are 0.267 rad (focal length 120 px): 0.533 s, in steps of a factor of 1.25.
       {[](double t_s) {
          return Rigid3{rotationBy({0, 0, t_s}), {0, 0, 0}};
        },
@@ -76,7 +76,7 @@ TEST(OptionChoice, TheWindowIsBoundByTheRecordingTheMotionAndASecond) {
   }
 }
 
-/// A pan-tilt head: 10 degrees a second, and a lever of some centimetres.
+/// Returns the pose of a pan-tilt head: 10 degrees per second and a lever of some centimetres.
 template <int kLeverMm>
 Rigid3 panning(double t_s) {
   const Eigen::Quaterniond rotation = rotationBy({0.02 * std::sin(5 * t_s), 0.17 * t_s, 0});
@@ -87,7 +87,7 @@ TEST(OptionChoice, LittleParallaxIsGivenALongWindowAndNeverANearScene) {
   const struct {
     Rigid3 (*T_world_rig)(double);
     bool is_proven;
-    double window_s;  // at least
+    double window_s;  // lower bound
   } cases[] = {{panning<40>, false, 0.9}, {panning<200>, true, 0.6}};
   const Rig rig = EdgeWorld::rig(1);
   for (const auto& c : cases) {
@@ -105,7 +105,7 @@ TEST(OptionChoice, LittleParallaxIsGivenALongWindowAndNeverANearScene) {
 }
 
 TEST(DepthSensitivity, IsThatOfTheSpeedAndOfTheTravel) {
-  // 0.32 m/s in the middle, 0.004 m/s faster after 10 ms.
+  // The speed is 0.32 m/s in the middle and grows by 0.004 m/s in 10 ms.
   EdgeWorld world;
   world.T_world_rig = [](double t_s) {
     return Rigid3{Eigen::Quaterniond::Identity(), {0.2 * t_s * t_s, 0, 0}};
@@ -190,7 +190,7 @@ TEST(OptionChoice, KeepsTheValuesWhereNothingIsSeen) {
   EXPECT_EQ(survey.policy.window_s, 0.7);
   EXPECT_EQ(survey.policy.stride_s, 0.7);
 
-  // One camera that stands still sees no depth, whatever moves before it.
+  // A single camera at rest measures no depth, whatever moves in front of it.
   const Rig one = EdgeWorld::rig(1);
   WindowSample still = EdgeWorld().sample(one);
   Trajectory fixed;
@@ -201,7 +201,7 @@ TEST(OptionChoice, KeepsTheValuesWhereNothingIsSeen) {
   EXPECT_EQ(of_still.keyframe.planes.min_depth_m, before.min_depth_m);
 }
 
-/// Depths evenly spread in inverse depth.
+/// Draws depths that are uniform in inverse depth.
 cv::Mat1f scene(double near_m, double far_m, std::uint32_t seed = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> inverse(1 / far_m, 1 / near_m);
@@ -216,17 +216,17 @@ AutomaticOptions limits() {
   return automatic;
 }
 
-/// The planes for a scene.
+/// Returns the planes for a scene.
 DepthPlanesOptions planesFor(double near_m, double far_m) {
   const InverseRange limits = limitsAround({1 / far_m, 1 / near_m});
   return {1 / limits.near, 1 / limits.far, 100};
 }
 
 TEST(DepthFollower, LimitsFollowAScene) {
-  for (const double factor : {0.4, 2.0}) {  // nearer, farther
+  for (const double factor : {0.4, 2.0}) {  // nearer or farther
     DepthFollower follower(limits(), planesFor(1, 4), 100);
     for (int keyframe = 0; keyframe < 10; ++keyframe) follower.follow(scene(factor, 4 * factor));
-    // Within the factor of 1.2 that noise may have.
+    // Noise may change the limits by a factor of up to 1.2.
     const DepthPlanesOptions wanted = planesFor(factor, 4 * factor);
     EXPECT_NEAR(std::log(follower.planes().min_depth_m / wanted.min_depth_m), 0, std::log(1.2));
     EXPECT_NEAR(std::log(follower.planes().max_depth_m / wanted.max_depth_m), 0, std::log(1.2));
@@ -236,7 +236,7 @@ TEST(DepthFollower, LimitsFollowAScene) {
 TEST(DepthFollower, PlanesComeBackWithTheScene) {
   struct Row {
     const char* what;
-    double near_m, far_m;  // of the scene beside which something else comes
+    double near_m, far_m;  // limits of the scene at the start
     double other_near_m, other_far_m;
     double planes_m;  // per 1/m of inverse depth
   };
@@ -271,7 +271,7 @@ TEST(DepthFollower, PlanesComeBackWithTheScene) {
                 std::log(1.25))
           << row.what;
       see(row.near_m, row.far_m);
-      // The limits come back up to the factor of 1.2 that noise may have.
+      // The limits come back, up to the factor of 1.2 that noise may have.
       EXPECT_NEAR(follower.planes().num_planes, start.num_planes, 0.25 * start.num_planes)
           << row.what;
     }
@@ -293,7 +293,7 @@ TEST(DepthFollower, ManyPointsAtAnAutomaticLimitAreAMisfit) {
   const DepthPlanesOptions planes{0.5, 5.0, 100};
   for (const bool near : {true, false}) {
     for (const double fraction : {0.055, 0.065}) {  // the limit is 6 %
-      // 2 % of the range of 1.8 / m is near a limit.
+      // Depths within 2 % of the range of 1.8 1/m are near a limit.
       cv::Mat1f depth(50, 40, 1.0F);
       const double inverse = near ? 2 - 0.035 : 0.2 + 0.035;
       for (int i = 0; i < static_cast<int>(fraction * 2000); ++i) {

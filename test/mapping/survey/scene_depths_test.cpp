@@ -28,7 +28,7 @@ TEST(SpreadSamples, KeepsAtMostEightEvenlySpreadOfAnyNumber) {
       EXPECT_EQ(samples[i].window.t0_ns, static_cast<std::int64_t>(i) * step_ns) << count;
     }
     if (samples.size() < 2) continue;
-    // The rest after the last sample is not longer than two steps.
+    // The rest after the last sample is shorter than two steps.
     EXPECT_GT(samples.back().window.t0_ns + 2 * samples[1].window.t0_ns,
               static_cast<std::int64_t>(count - 1) * 100)
         << count;
@@ -53,7 +53,7 @@ TEST(WindowSample, HasItsEventsWithinAWindowAndAroundItsMiddle) {
 using test::EdgeWorld;
 
 TEST(DenseRange, HasAPartOfThePointsThatIsMoreThanHalfOfItsPartOfTheRange) {
-  // A hundred points, and twenty more, a sixth of all, that much of the range away.
+  // 100 points and 20 more (a sixth of all) at a distance of `away` of the range.
   for (const auto& [away, joined] : {std::pair{0.31, true}, {0.36, false}}) {
     for (const bool nearer : {true, false}) {
       SceneDepths depths;
@@ -72,7 +72,7 @@ TEST(DenseRange, HasAPartOfThePointsThatIsMoreThanHalfOfItsPartOfTheRange) {
 }
 
 TEST(LimitsAround, AreTenTimesApartUnlessTheSceneIsWide) {
-  // sqrt(10 / 2), and to the power of 0.75.
+  // The factors are sqrt(10 / 2) and its power of 0.75.
   EXPECT_NEAR(limitsAround({0.5, 1}).near, 2.23607, 1e-5);
   EXPECT_NEAR(limitsAround({0.5, 1}).far, 0.5 / 1.82859, 1e-5);
   EXPECT_DOUBLE_EQ(limitsAround({0.1, 2}).near, 2.5);
@@ -87,7 +87,7 @@ TEST(MotionIn, IsTheLargestFromTheMiddleOfTheWindow) {
       rig.cameras[c].T_rig_cam = {Eigen::Quaterniond::Identity(), 0.15 * double(c) * side};
     }
     WindowSample sample;
-    for (int i = 0; i <= 40; ++i) {  // 1 m/s, and faster in the end
+    for (int i = 0; i <= 40; ++i) {  // 1 m/s, with a step of 0.1 m
       const double t_s = 0.01 * i;
       sample.trajectory.add({durationFromSeconds(t_s),
                              {rotationBy({0, 0, 0.5 * t_s}), (t_s + (i > 25 ? 0.1 : 0)) * side}});
@@ -100,7 +100,7 @@ TEST(MotionIn, IsTheLargestFromTheMiddleOfTheWindow) {
     EXPECT_NEAR(motion->shift_m, 0.3, 1e-9);
     EXPECT_NEAR(motion->rotation_rad, 0.1, 1e-9);
     EXPECT_NEAR(motion->rig_baseline_m, 0.3, 1e-9);
-    // 120 px of focal length, 0.6 m; the second camera is turned with the rig.
+    // Focal length 120 px, 0.6 m. The second camera rotates with the rig.
     EXPECT_NEAR(motion->parallax_px_m, 120 * 0.6 * std::cos(0.1), 1e-9);
     EXPECT_FALSE(motionIn({{0, 1, 900'000'000}, {}, &sample.trajectory}, rig, options));
   }
@@ -127,7 +127,7 @@ TEST(PoseHypotheses, AreThePosesInvertedTheOtherQuaternionAndAllAxes) {
   ASSERT_EQ(all.size(), 25U);
   const Rigid3 pose{Eigen::Quaterniond(0.1, 0.2, 0.3, 0.9).normalized(), {1, 2, 3}};
   EXPECT_TRUE(isSame(all[0].T_world_rig(pose), pose.inverse()));
-  // Its x was w, its y x, and so on.
+  // The order of the components is wrong: x is read as w, y as x, and so on.
   const Eigen::Vector4d q = pose.rotation.coeffs();
   EXPECT_EQ(all[1].T_world_rig(pose).rotation.coeffs(), Eigen::Vector4d(q[1], q[2], q[3], q[0]));
   for (std::size_t i = 2; i < all.size(); ++i) {
@@ -140,7 +140,7 @@ TEST(PoseHypotheses, AreThePosesInvertedTheOtherQuaternionAndAllAxes) {
   }
 }
 
-/// Poses every 5 ms at 1 m/s, with either sign of the quaternion; an event per millisecond.
+/// Returns poses every 5 ms at 1 m/s with alternating signs of the quaternion, and an event per ms.
 WindowSample steadySample(std::int64_t t0_ms, std::int64_t length_ms) {
   WindowSample sample;
   sample.window = {t0_ms * 1'000'000, (t0_ms + length_ms) * 1'000'000, 0};
@@ -164,7 +164,7 @@ TEST(SamplePieces, AreFourSpreadEvenlyThoseInTheMiddleFirstWithoutJitter) {
       EXPECT_EQ(piece.window.t_ref_ns, (piece.window.t0_ns + piece.window.t1_ns) / 2);
       for (const Event& event : piece.events.at(0)) EXPECT_TRUE(piece.window.contains(event.t_ns));
       EXPECT_NEAR(double(piece.events[0].size()), 1e3 * length_s, 1.5);
-      // The mean of the poses of 20 ms.
+      // Each pose is the mean of the poses of 20 ms.
       const std::vector<StampedPose>& poses = piece.trajectory.poses();
       EXPECT_EQ(poses[1].t_ns - poses[0].t_ns, 20'000'000);
       EXPECT_NEAR(poses[1].T_world_rig.translation.x(), 1e-9 * double(poses[1].t_ns), 1e-9);
@@ -175,11 +175,11 @@ TEST(SamplePieces, AreFourSpreadEvenlyThoseInTheMiddleFirstWithoutJitter) {
   };
   using ::testing::DoubleNear;
   using ::testing::ElementsAre;
-  // From the first mean pose at 7.5 ms to the last: of 1.6 s 0.5 s begin in 1.0925 s.
+  // Mean poses begin at 7.5 ms: in 1.6 s, pieces of 0.5 s begin within 1.0925 s.
   EXPECT_THAT(startsOf({steadySample(0, 1600)}, 0.5),
               ElementsAre(DoubleNear(417.2, 3), DoubleNear(690.3, 3), DoubleNear(144.1, 3),
                           DoubleNear(963.4, 3)));
-  // A quarter of a second at least of 0.3 s, and all of less.
+  // Pieces last at least 0.25 s (of 0.3 s), or as long as a shorter sample.
   EXPECT_THAT(startsOf({steadySample(0, 300)}, 0.25),
               ElementsAre(DoubleNear(23.4, 3), DoubleNear(34.1, 3), DoubleNear(12.8, 3),
                           DoubleNear(44.7, 3)));
@@ -206,7 +206,7 @@ Recorded recorded(std::size_t cameras, const EdgeWorld& world = {}) {
   return {rig, world.sample(rig)};
 }
 
-/// x forward, y left, z up; the camera's are z, -x, -y.
+/// Returns R for a body with x forward, y left, z up: the camera's z, -x, -y.
 Eigen::Matrix3d forwardLeftUp() {
   Eigen::Matrix3d R_body_rig;
   R_body_rig << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -224,7 +224,7 @@ void later(Recorded& recorded) {
 struct Row {
   const char* name;
   PoseMistake found;
-  bool one_camera;  // finds it, too
+  bool one_camera;  // true if one camera is enough
   void (*make)(Recorded&);
   double shift_s = 0;
 };
@@ -289,7 +289,7 @@ TEST(PoseCheck, FindsEachMistake) {
         EXPECT_EQ(finding->R_body_rig, forwardLeftUp());
       }
       if (row.found == PoseMistake::kTimeShift) {
-        // Neighbouring times of the search are 3 ms apart, and the events have noise.
+        // Adjacent times of the search are 3 ms apart, and the events have noise.
         EXPECT_NEAR(finding->shift_s, row.shift_s, row.shift_s > 0.1 ? 0.02 : 0.007);
       }
     }
@@ -324,7 +324,7 @@ TEST(PoseCheck, AccusesNoRightPoses) {
 
 TEST(PoseCheck, SaysNothingWithoutParallax) {
   static double speed_m_s;
-  for (const double speed : {0.0, 0.01, 0.02}) {  // 5 mm to either side of a piece's middle
+  for (const double speed : {0.0, 0.01, 0.02}) {  // 0.02: 5 mm on each side of a piece's middle
     speed_m_s = speed;
     EdgeWorld turning;
     turning.T_world_rig = [](double t_s) {
@@ -342,7 +342,7 @@ TEST(PoseCheck, SaysNothingWithoutParallax) {
 TEST(PoseCheck, CamerasOfOtherSizesAreNotExchanged) {
   Recorded uneven = recorded(2);
   CameraModel& model = uneven.rig.cameras[1].model;
-  model.height -= 30;  // the first camera's events would lie outside
+  model.height -= 30;  // events of the first camera would be outside
   auto& events = uneven.sample.events[1];
   events.erase(std::remove_if(events.begin(), events.end(),
                               [&](const Event& event) { return event.y >= model.height; }),

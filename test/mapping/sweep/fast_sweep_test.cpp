@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The fast kernels against the plain one: cameras anywhere, few and many planes and rays, views of
-// any size, and every bound that a size is derived from.
+// Compares the fast kernels with the plain kernel: cameras anywhere, few and many planes and rays,
+// views of any size, and every bound from which a size is derived.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -24,20 +24,20 @@ namespace {
 using Centers = std::vector<Eigen::Vector3d>;
 using Points = std::vector<Eigen::Vector2d>;
 
-/// The votes of rays in double precision, and bounds for the errors of floats.
+/// Votes of rays in double precision, and bounds for the errors of floats.
 struct ExactVotes {
   std::vector<double> dsi;  ///< [plane][row][column]
   VoteCounts counts;
-  /// Votes so near the border of the view that rounding decides whether they are cast.
+  /// Votes so near to the border of the view that rounding decides whether they are cast.
   std::uint64_t at_border = 0;
-  /// How far rounded floats may move all votes together, summed over x and y, pixels.
+  /// Largest sum of the shifts of all votes in x and y by the rounding of floats, pixels.
   double float_shift_px = 0;
 };
 
-/// @param unit_px coordinates are also rounded to this: 1/4096 px in the fast kernels.
+/// @param unit_px unit of rounded coordinates: 1/4096 px in the fast kernels.
 ExactVotes voteExactly(const RayBundle& rays, const ReferenceView& view, const DepthPlanes& planes,
                        double unit_px = 1.0 / 4096) {
-  // One of a product, one of a sum, and as many on the plane where rays are binned.
+  // One rounding of a product, one of a sum, and two more on the plane of the binning.
   constexpr double kRoundings = 4.0 / (1 << 24);
   ExactVotes votes;
   votes.dsi.resize(static_cast<std::size_t>(planes.size()) * view.pixels());
@@ -56,7 +56,7 @@ ExactVotes voteExactly(const RayBundle& rays, const ReferenceView& view, const D
         const double y = from_y + to.offset_y;
         const double shift_x = kRoundings * std::max(std::abs(from_x), std::abs(to.offset_x));
         const double shift_y = kRoundings * std::max(std::abs(from_y), std::abs(to.offset_y));
-        // How far outside, or inside where negative.
+        // Distance from the border in pixels: positive outside, negative inside.
         const double out = std::max({-x, x - (view.width - 1), -y, y - (view.height - 1)});
         if (std::abs(out) <= unit_px + std::max(shift_x, shift_y)) ++votes.at_border;
         if (!(x >= 0 && x < view.width - 1 && y >= 0 && y < view.height - 1)) {
@@ -81,13 +81,13 @@ ExactVotes voteExactly(const RayBundle& rays, const ReferenceView& view, const D
   return votes;
 }
 
-/// Of few votes some may all be rounded far: a shift of 1/4096 px in x and in y.
+/// Largest error per vote. If votes are few, all may be rounded by 1/4096 px in x and in y.
 constexpr double kMostPerVote = 4.0 / 4096 + 4.0 / 32'768;
 
-/// Holds a fast kernel's counts and DSI against the plain one's, to the bounds that rounding gives,
-/// and the plain one's counts against the exact ones: counts exactly but for votes at the border of
-/// the view.
-/// @param input fused by arithmetic means, in which errors neither grow nor vanish.
+/// Compares a fast kernel's counts and DSI with those of the plain kernel within the bounds of
+/// rounding, and the plain kernel's counts with the exact counts. Counts may differ only by votes
+/// at the border of the view.
+/// @param input fused by arithmetic means, which neither increase nor reduce errors.
 void expectThePlainSweep(const test::SweepCase& input, VotingKernel kernel) {
   constexpr double kFewVotes = 1000;
   const test::SweepOutput fast = sweep(input, kernel, 2);
@@ -144,7 +144,7 @@ class FastSweepOn : public ::testing::TestWithParam<VotingKernel> {
     return kPlanes;
   }
 
-  /// For each centre and each plane in front of it: rays that fill the view on that plane.
+  /// Returns for each centre and each plane in front of it rays that fill the view on that plane.
   RayBundle raysFrom(const Centers& centers, bool forward, const DepthPlanes& planes,
                      const ReferenceView& view = kView, int rays = 300) {
     RayBundle bundle;
@@ -158,7 +158,7 @@ class FastSweepOn : public ::testing::TestWithParam<VotingKernel> {
     }
     return bundle;
   }
-  /// Packets of a camera that moves along a line.
+  /// Returns packets of a camera that moves along a line.
   RayBundle walk(const DepthPlanes& planes, const Eigen::Vector3d& step, int packets, int rays,
                  const ReferenceView& view = kView) {
     RayBundle bundle;
@@ -206,7 +206,7 @@ TEST_P(FastSweepOn, CamerasBeforeBetweenAndBehindPlanesAreThePlainKernels) {
 }
 
 TEST_P(FastSweepOn, CamerasOnAPlaneAreBehindItAsInThePlainKernel) {
-  // Depths whose inverse is rounded, so that a centre's depth times it is not 1.
+  // The inverses of these depths are rounded: the depth times its inverse is not 1.
   for (const double farthest : {49.0, 4.9}) {
     for (const int count : {1, 2, 9}) {
       const DepthPlanes planes = linear(0.49, farthest, count);
@@ -214,7 +214,7 @@ TEST_P(FastSweepOn, CamerasOnAPlaneAreBehindItAsInThePlainKernel) {
         for (const bool forward : {true, false}) {
           SCOPED_TRACE(testing::Message() << "on plane " << plane << " of " << count << " to "
                                           << farthest << (forward ? " forward" : " backward"));
-          // The pixel that all rays would meet is inside the view.
+          // The pixel where all rays would meet is inside the view.
           const Eigen::Vector3d center(0.01, 0.02, planes.depth(plane));
           RayBundle rays = raysFrom({center}, forward, planes);
           test::appendPacket({center, forward, 0.3}, kView, random_.points(kView, 100), rays);
@@ -268,7 +268,7 @@ TEST_P(FastSweepOn, FewAndManyPlanesAndPacketsAreThePlainKernels) {
        {0.02, -0.01, 0.001},
        300,
        60},
-      // A ray moves by less than 1 px between all planes, and by 200 px from each to the next.
+      // A ray moves by less than 1 px over all planes, or by 200 px from each plane to the next.
       {"all planes in one group", inverse(0.5, 5, 10), {1e-5, 0, 0}, 10, 300},
       {"a group for each plane", inverse(0.5, 5, 10), {12, 0, 0}, 2, 300},
   };
@@ -302,7 +302,7 @@ TEST_P(FastSweepOn, EmptyPacketsChangeNothingAndEmptyBundlesLeaveTheDsiEmpty) {
 TEST_P(FastSweepOn, ParallaxOfHundredsOfPixelsAtHdIsThePlainKernels) {
   const ReferenceView view{1280, 720, 836, 836, 639.5, 359.5};
   const DepthPlanes planes = inverse(0.3, 10, 2);
-  // 0.5 m aside are 1350 px between the planes; some fly 2.5 m aside and 1 m back.
+  // 0.5 m sideways are 1350 px between the planes. One camera moves 2.5 m sideways and 1 m back.
   for (const Eigen::Vector3d& side : Centers{{-0.5, 0.4, 0.05}, {2.5, -2, -1}, {0.1, 0.1, 0.299}}) {
     SCOPED_TRACE(testing::Message() << "to " << side.transpose());
     expectPlain(planes, walk(planes, side / 59, 60, 150, view), view);
@@ -312,8 +312,8 @@ TEST_P(FastSweepOn, ParallaxOfHundredsOfPixelsAtHdIsThePlainKernels) {
 TEST_P(FastSweepOn, ParallaxOfTenTimesTheViewIsThePlainKernels) {
   const ReferenceView view{200, 150, 150, 150, 100, 75};
   const DepthPlanes planes = inverse(0.5, 5, 12);
-  // From the middle a ray moves by 150 C_x (2 - 0.2) / 2 px to the outermost planes: 2048 with
-  // C_x = 15.17.
+  // From the middle plane to the outermost planes, a ray moves by 150 C_x (2 - 0.2) / 2 px (C_x: x
+  // of the centre, m): 2048 px if C_x = 15.17.
   for (const Eigen::Vector3d& center : Centers{{15.1, 0, 0},
                                                {15.16, 0, 0},
                                                {15.17, 0, 0},
@@ -330,7 +330,7 @@ TEST_P(FastSweepOn, ParallaxOfTenTimesTheViewIsThePlainKernels) {
   }
 }
 
-/// The first cells of the parts of a side, the last cells before them, and the side's ends.
+/// Returns the first cells of the tiles along a side, the cells before them, and the side's ends.
 std::vector<double> bordersOf(int side) {
   std::vector<double> borders = {0, 1.0 * (side - 1)};
   for (const cv::Rect& tile : tilesOf({side, 1, 1, 1, 0, 0}, TileCells::kMaxPixels)) {
@@ -365,7 +365,7 @@ TEST_P(FastSweepOn, RaysOnEveryBorderOfTilesAndTheViewAreCountedOnce) {
 }
 
 TEST_P(FastSweepOn, RaysThatCrossBordersOfTilesFromPlaneToPlaneAreNeverLost) {
-  // As many steps across each border of two tiles as there are fractions of a pixel.
+  // Rays cross each border between two tiles in small steps, at many fractions of a pixel.
   const ReferenceView view{100, 100, 80, 80, 50, 50};
   const DepthPlanes planes = inverse(0.5, 5, 400);
   for (const Eigen::Vector3d& center : Centers{{0.01, 0.02, 0}, {0, 0, -0.4}, {-0.3, 0.01, 0.1}}) {
@@ -378,7 +378,7 @@ TEST_P(FastSweepOn, RaysThatCrossBordersOfTilesFromPlaneToPlaneAreNeverLost) {
 }
 
 TEST_P(FastSweepOn, WideAndHighViewsAreThePlainKernels) {
-  // Coordinates count from multiples of 1984 px: of no, one and several tiles.
+  // Coordinates count from multiples of 1984 px. The views have one or more of these origins.
   const DepthPlanes planes = inverse(0.5, 5, 4);
   for (const cv::Size& size : {cv::Size(1023, 8), cv::Size(1026, 9), cv::Size(2050, 7),
                                cv::Size(4100, 6), cv::Size(10'000, 8), cv::Size(5, 9000)}) {
@@ -391,9 +391,9 @@ TEST_P(FastSweepOn, WideAndHighViewsAreThePlainKernels) {
 }
 
 TEST_P(FastSweepOn, VotesWhereTheOriginOfCoordinatesChangesHaveTheirWeights) {
-  // Every ray stays in the view, near the first pixel of a tile whose origin is not its
-  // neighbour's. Both tiles round alike but for the last bit: some votes on the border count twice
-  // or not at all.
+  // Every ray stays in the view, near the first pixel of a tile whose origin differs from its
+  // neighbour's. The last bit of rounding differs between the two tiles: some votes on the border
+  // count twice or not at all.
   const ReferenceView view{2100, 3, 500, 500, 1050, 1};
   const std::vector<cv::Rect> tiles = tilesOf(view, TileCells::kMaxPixels);
   const auto border = std::find_if(tiles.begin(), tiles.end(), [&](const cv::Rect& tile) {
@@ -413,7 +413,7 @@ TEST_P(FastSweepOn, VotesWhereTheOriginOfCoordinatesChangesHaveTheirWeights) {
 
 // ---------------------------------------------------------------- random rigs, any view
 
-/// Where tiles of 63 pixels end, and vectors of up to 16.
+/// Sizes around the ends of tiles of 63 pixels and of vectors of up to 16.
 const std::vector<cv::Size> kOddSizes = {{1, 1},   {2, 2},    {1, 50},   {50, 1},    {2, 64},
                                          {17, 16}, {63, 63},  {64, 64},  {65, 127},  {126, 126},
                                          {127, 3}, {128, 62}, {190, 33}, {200, 130}, {63, 190}};
@@ -447,7 +447,7 @@ TEST_P(FastSweepOn, RandomRigsPlanesGroupsAndViewsAreThePlainKernels) {
   }
 }
 
-/// Two cameras in one slot have a shortcut, where nothing else is asked for.
+/// Two cameras in one slot take a shortcut if no other results are requested.
 TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCounts) {
   const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
   for (const cv::Size& size : {cv::Size(1, 1), {64, 64}, {130, 70}}) {

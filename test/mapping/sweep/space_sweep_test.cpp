@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From events to the DSI against the oracle, and the other results of a sweep.
+// Compares the DSI of events with the oracle, and tests the other results of a sweep.
 #include "mapping/sweep/space_sweep.h"
 
 #include <gtest/gtest.h>
@@ -26,13 +26,13 @@ using Recording = test::RandomRecording;
 
 constexpr Window kWindow = Recording::kWindow;
 
-/// Every event with a pose of its own, so that only rounding differs.
+/// Returns options that give every event its own pose, so that only rounding differs.
 KeyframeMapperOptions exactOptions(const SplitFusionOptions& split, int subintervals) {
   KeyframeMapperOptions options;
   options.split = split;
   options.extraction.extraction = ExtractionMethod::kPaper;  // only the DSI matters
   options.planes = {0.5, 4.0, 2, PlaneSpacing::kInverse};
-  options.view.width = 24;  // a quarter of the pixels, so that each has votes in every group
+  options.view.width = 24;  // a quarter of the pixels: each has votes in every group
   options.packets.packet_error_px = 0;
   options.subintervals.count = subintervals;
   options.sweep.threads = 1;
@@ -47,8 +47,8 @@ std::vector<float> dsiOf(const Recording& recording, const KeyframeMapperOptions
   return dsi.values;
 }
 
-/// The oracle's ray densities, [camera][sub-interval of the window][polarity]. Without a split by
-/// polarity all events have polarity 0.
+/// The oracle's ray densities, [camera][sub-interval of the window][polarity]. All events have
+/// polarity 0 if there is no split by polarity.
 using Parts = std::vector<std::vector<std::vector<oracle::Dsi>>>;
 
 Parts exactParts(const Recording& recording, const KeyframeMapperOptions& options) {
@@ -77,8 +77,8 @@ Parts exactParts(const Recording& recording, const KeyframeMapperOptions& option
   return parts;
 }
 
-/// The sum over slices and polarities of the fused cameras and sub-intervals. Of a single camera:
-/// the sum over polarities of the fused slices and sub-intervals.
+/// Returns the sum over slices and polarities of the fused cameras and sub-intervals. For a single
+/// camera: the sum over polarities of the fused slices and sub-intervals.
 oracle::Dsi exactDsi(const Parts& parts, const KeyframeMapperOptions& options) {
   const auto subintervals = static_cast<std::size_t>(options.subintervals.count);
   const std::size_t slices = parts[0].size() / subintervals;

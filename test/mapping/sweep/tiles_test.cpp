@@ -21,7 +21,7 @@ constexpr double kLastFraction = 4095.0 / 4096;
 
 struct TileVotes {
   std::vector<float> density;
-  std::uint64_t units = 0;  // of all weights
+  std::uint64_t units = 0;  // sum of all weights
 };
 
 constexpr std::uint64_t kUnitsOfVote = 1U << kernels::kWeightBits;
@@ -36,7 +36,7 @@ TileVotes voteWith(TileAccumulator& accumulator, const cv::Rect& tile, const Poi
   return result;
 }
 
-/// The whole view, tile by tile.
+/// Votes on the whole view, tile by tile.
 TileVotes voteOnView(VotingKernel kernel, const Points& points) {
   TileAccumulator accumulator(kernel);
   TileVotes all{std::vector<float>(test::kTiledView.pixels(), -1.0F), 0};
@@ -51,7 +51,7 @@ TileVotes voteOnView(VotingKernel kernel, const Points& points) {
   return all;
 }
 
-/// The plain kernel's votes one by one, summed in doubles: many equal floats add up to another sum.
+/// Votes of the plain kernel, cast one by one. Sums are in double: sums of many floats are rounded.
 struct VotesOneByOne {
   std::vector<double> density;
   std::uint64_t votes = 0;
@@ -78,13 +78,13 @@ VotesOneByOne voteOneByOne(const Points& points) {
   return all;
 }
 
-/// @param per_vote how far a weight may be off.
+/// @param per_vote largest error of a weight.
 void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote) {
   const TileVotes fast = voteOnView(kernel, points);
   const VotesOneByOne plain = voteOneByOne(points);
   EXPECT_EQ(fast.units, plain.votes * kUnitsOfVote);
   for (std::size_t i = 0; i < plain.density.size(); ++i) {
-    // A vote's float weights, and sums of full cells: one rounding for each of 64 votes at most.
+    // Float weights of a vote and sums of full cells: at most one rounding per 64 votes.
     const double rounding = 1.2e-7 * (1 + static_cast<double>(points.size()) / 64);
     ASSERT_NEAR(fast.density[i], plain.density[i],
                 per_vote * static_cast<double>(points.size()) + rounding * (1 + plain.density[i]))
@@ -92,7 +92,7 @@ void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote
   }
 }
 
-/// A weight is off by this at most: half a unit for the row, and half a unit for the column.
+/// The largest error of a weight: half a unit for the row plus half a unit for the column.
 constexpr double kWeightError = 1.0 / (1 << kernels::kWeightBits);
 
 class TileAccumulatorOn : public ::testing::TestWithParam<VotingKernel> {};
@@ -152,17 +152,17 @@ TEST_P(TileAccumulatorOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
     TileAccumulator accumulator(GetParam());
     const TileVotes votes = voteWith(accumulator, tile, points);
     EXPECT_EQ(votes.units, std::uint64_t{kVotes} * 63 * 63 * kUnitsOfVote);
-    // The four weights around a pixel are those of one vote, whatever the fraction.
+    // The four weights around a pixel add up to one vote for any fraction.
     for (const float density : votes.density) ASSERT_NEAR(density, kVotes, 1e-4) << fraction;
   }
 }
 
-/// Tiles that fill vectors or leave a rest, in the middle and on each border of the view.
+/// Tiles with and without a rest of vectors, in the middle and on each border of the view.
 const std::vector<cv::Rect> kTiles = {{0, 0, 63, 63},   {50, 43, 50, 43}, {87, 67, 63, 63},
                                       {20, 30, 1, 1},   {149, 0, 1, 63},  {60, 129, 17, 1},
                                       {30, 40, 16, 20}, {31, 41, 33, 3},  {0, 100, 48, 30}};
 
-/// Rays in and around a tile, in clusters, so that most cells are empty where there are few.
+/// Draws rays in and around a tile, in clusters: most cells are empty if there are few rays.
 TileRays clusteredRays(std::mt19937& random, const TileCells& cells, std::size_t count) {
   const cv::Rect& tile = cells.tile;
   std::uniform_real_distribution<double> across(-3, tile.width + 3);
@@ -177,7 +177,7 @@ TileRays clusteredRays(std::mt19937& random, const TileCells& cells, std::size_t
   return test::raysAt(points, cells.origin);
 }
 
-/// From none to so many that cells fill up.
+/// Numbers of rays: from none up to full cells.
 const std::vector<std::size_t> kCounts = {0, 1, 9, 60, 400, 3000, 90'000};
 
 class TileFusionOn : public ::testing::TestWithParam<VotingKernel> {};
@@ -185,7 +185,7 @@ class TileFusionOn : public ::testing::TestWithParam<VotingKernel> {};
 INSTANTIATE_TEST_SUITE_P(Kernels, TileFusionOn, ::testing::ValuesIn(test::fastKernels()),
                          test::nameOfKernel);
 
-/// The inputs of a tile on two planes, fused by `PlaneFusion` alone.
+/// Fuses the inputs of a tile on two planes by `PlaneFusion` alone.
 PlaneValues fusePlainly(VotingKernel kernel, const TileCells& cells, std::vector<TileRays>& rays,
                         const FusionOptions& options, const FusionInputs& inputs,
                         std::vector<std::uint64_t>& units) {
