@@ -65,7 +65,7 @@ struct SweepInput {
   std::vector<PosePackets> packets;  ///< The packets of each camera.
 };
 
-/// Back-projects the window's cameras into the view of the first.
+/// Back-projects the window's cameras into the view of the first camera.
 SweepInput makeSweepInput(const SyntheticWindow& made, int planes);
 
 }  // namespace efm::bench

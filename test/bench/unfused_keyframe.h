@@ -24,7 +24,7 @@ namespace efm::bench {
 /// The volumes are kept from one keyframe to the next, so their memory is allocated once.
 class UnfusedKeyframe {
  public:
-  /// All cameras of the rig are used.
+  /// Uses all cameras of the rig.
   UnfusedKeyframe(const Rig& rig, const KeyframeMapperOptions& options);
 
   /// @return std::nullopt if the reference time has no pose.

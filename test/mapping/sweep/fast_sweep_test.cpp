@@ -206,7 +206,7 @@ TEST_P(FastSweepOn, CamerasBeforeBetweenAndBehindPlanesAreThePlainKernels) {
 }
 
 TEST_P(FastSweepOn, CamerasOnAPlaneAreBehindItAsInThePlainKernel) {
-  // The inverses of these depths are rounded: the depth times its inverse is not 1.
+  // The inverses of these depths are rounded: the depth of a centre times the inverse is not 1.
   for (const double farthest : {49.0, 4.9}) {
     for (const int count : {1, 2, 9}) {
       const DepthPlanes planes = linear(0.49, farthest, count);
