@@ -17,6 +17,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"
 #include "plugin/recordings/bags/bag_source.h"
+#include "plugin/recordings/bags/mcap_records.h"
 #include "plugin/recordings/bags/ros_messages.h"
 
 namespace efm {

@@ -8,7 +8,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -98,28 +97,5 @@ std::unique_ptr<BagSource> openDb3(const std::filesystem::path& file);
 /// verified. If a file has no summary, or its recording was cut off, it is read once from its
 /// beginning to its end to find the channels and chunks.
 std::unique_ptr<BagSource> openMcap(const std::filesystem::path& file);
-
-/// The structure of MCAP files (mcap.dev/spec), for reader and writer: a magic word, records and
-/// the magic word again. A record has an op, a size of 64 bits and its content. Numbers are
-/// little-endian.
-
-inline constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
-
-enum class McapOp : std::uint8_t {
-  kHeader = 1,
-  kFooter = 2,
-  kSchema = 3,
-  kChannel = 4,
-  kMessage = 5,
-  kChunk = 6,
-  kMessageIndex = 7,
-  kChunkIndex = 8,
-  kStatistics = 11,
-  kSummaryOffset = 14,
-  kDataEnd = 15,
-};
-
-inline constexpr std::size_t kMcapRecordHead = 9;      // op and size
-inline constexpr std::size_t kMcapFooterContent = 20;  // summary, summary offsets, checksum
 
 }  // namespace efm

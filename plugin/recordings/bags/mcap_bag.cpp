@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/bags/bag_source.h"
-
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -12,6 +10,8 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_chunks.h"
+#include "plugin/recordings/bags/bag_source.h"
+#include "plugin/recordings/bags/mcap_records.h"
 
 namespace efm {
 namespace {
@@ -21,16 +21,17 @@ struct McapRecord {
   ByteReader content;
 };
 
+ByteReader readerOf(std::string_view bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
 McapRecord takeMcapRecord(ByteReader& bytes) {
   const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
   const std::uint64_t size = bytes.number<std::uint64_t>();
   return {op, ByteReader(bytes.take(size), size)};
 }
 
-std::string_view takeText(ByteReader& bytes) { return bytes.text(bytes.number<std::uint32_t>()); }
-
-std::int64_t takeTime(ByteReader& bytes) {
-  const std::uint64_t t_ns = bytes.number<std::uint64_t>();
+std::int64_t logTime(std::uint64_t t_ns) {
   if (t_ns < static_cast<std::uint64_t>(kEndOfTimeNs)) return static_cast<std::int64_t>(t_ns);
   throw std::runtime_error(
       fmt::format("log time {}: expected a time in ns before the year 2116", t_ns));
@@ -79,9 +80,7 @@ bool McapBag::readSummary() {
   ByteReader bytes(tail.get(), tail_size);
   const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
   const std::uint64_t size = bytes.number<std::uint64_t>();
-  const std::uint64_t summary = bytes.number<std::uint64_t>();
-  bytes.number<std::uint64_t>();  // summary offsets
-  const std::uint32_t checksum = bytes.number<std::uint32_t>();
+  const auto [summary, offsets, checksum] = takeMcapFields<McapFooter>(bytes);
   if (op != McapOp::kFooter || size != kMcapFooterContent || bytes.text(magic) != kMcapMagic) {
     return false;  // the recording was cut off
   }
@@ -128,14 +127,14 @@ bool McapBag::readSummary() {
 }
 
 BagChunk McapBag::chunkOfIndex(ByteReader content) const {
+  const auto index = takeMcapFields<McapChunkIndex>(content);
   BagChunk chunk;
-  chunk.first_log_ns = takeTime(content);
-  chunk.last_log_ns = takeTime(content);
-  chunk.offset = content.number<std::uint64_t>();
-  chunk.size = content.number<std::uint64_t>();
-  const std::uint32_t size = content.number<std::uint32_t>();
-  ByteReader indexes(content.take(size), size);
-  if (size > 0) chunk.topics = 0;  // size 0: the topics are unknown
+  chunk.first_log_ns = logTime(index.first_log_ns);
+  chunk.last_log_ns = logTime(index.last_log_ns);
+  chunk.offset = index.chunk;
+  chunk.size = index.chunk_record_size;
+  ByteReader indexes = readerOf(index.message_indexes);
+  if (indexes.remaining() > 0) chunk.topics = 0;  // else the topics are unknown
   while (indexes.remaining() > 0) {
     const auto channel = channels_.find(indexes.number<std::uint16_t>());
     indexes.number<std::uint64_t>();
@@ -145,17 +144,15 @@ BagChunk McapBag::chunkOfIndex(ByteReader content) const {
 }
 
 void McapBag::takeSchemaOrChannel(McapRecord& record) {
-  ByteReader& content = record.content;
   if (record.op == McapOp::kSchema) {
-    const std::uint16_t id = content.number<std::uint16_t>();
-    types_[id] = typeWithoutMsg(std::string(takeText(content)));
+    const auto schema = takeMcapFields<McapSchema>(record.content);
+    types_[schema.id] = typeWithoutMsg(std::string(schema.name));
   } else if (record.op == McapOp::kChannel) {
-    const std::uint16_t id = content.number<std::uint16_t>();
-    const auto type = types_.find(content.number<std::uint16_t>());
-    const std::string name(takeText(content));
-    const std::string_view encoding = takeText(content);
-    if (type == types_.end() || (encoding != "cdr" && encoding != "ros1")) return;
-    channels_[id] = {addTopic({name, type->second}), encoding == "cdr"};
+    const auto channel = takeMcapFields<McapChannel>(record.content);
+    const auto type = types_.find(channel.schema);
+    const bool cdr = channel.encoding == "cdr";
+    if (type == types_.end() || (!cdr && channel.encoding != "ros1")) return;
+    channels_[channel.id] = {addTopic({std::string(channel.topic), type->second}), cdr};
   }
 }
 
@@ -238,14 +235,12 @@ ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
       throw std::runtime_error(
           fmt::format("record of op {}: expected a chunk", static_cast<int>(op)));
     }
-    content.take(8 + 8);  // first and last log time
-    const std::uint64_t size = content.number<std::uint64_t>();
-    const std::uint32_t checksum = content.number<std::uint32_t>();
-    const ChunkCompression compression = chunkCompression(takeText(content), {"", "lz4", "zstd"});
-    file.size = content.number<std::uint64_t>();
+    const auto head = takeMcapFields<McapChunk>(content);
+    const ChunkCompression compression = chunkCompression(head.compression, {"", "lz4", "zstd"});
+    file.size = head.packed_size;
     file.data = content.take(file.size);
-    ChunkBytes records = unpackChunk(compression, std::move(file), size);
-    requireChecksum(checksum, records.data, records.size);
+    ChunkBytes records = unpackChunk(compression, std::move(file), head.size);
+    requireChecksum(head.checksum, records.data, records.size);
     return messagesIn(std::move(records));
   });
 }
@@ -260,10 +255,9 @@ ChunkMessages McapBag::messagesIn(ChunkBytes bytes) {
     takeSchemaOrChannel(record);
     if (record.op != McapOp::kMessage) continue;
     ByteReader& content = record.content;
-    const auto channel = channels_.find(content.number<std::uint16_t>());
-    content.number<std::uint32_t>();  // sequence
-    const std::int64_t log_ns = takeTime(content);
-    content.number<std::uint64_t>();  // publish time
+    const auto message = takeMcapFields<McapMessage>(content);
+    const auto channel = channels_.find(message.channel);
+    const std::int64_t log_ns = logTime(message.log_ns);
     if (channel == channels_.end()) continue;
     const std::size_t size = content.remaining();
     chunk.messages.push_back(

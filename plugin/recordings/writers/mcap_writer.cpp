@@ -12,7 +12,7 @@
 #include <type_traits>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/bags/bag_source.h"
+#include "plugin/recordings/bags/mcap_records.h"
 #include "plugin/recordings/writers/recording_writer.h"
 
 namespace efm {
@@ -22,27 +22,6 @@ template <typename Number>
 void appendNumber(std::string& bytes, Number value) {
   static_assert(std::is_arithmetic_v<Number>);
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(Number));  // little-endian machines
-}
-
-/// Returns the fields of an MCAP record as bytes: numbers, and texts after their size.
-template <typename... Fields>
-std::string fieldsOf(const Fields&... fields) {
-  std::string bytes;
-  const auto append = [&](const auto& field) {
-    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(field)>>) {
-      appendNumber(bytes, field);
-    } else {
-      const std::string_view text = field;
-      appendNumber(bytes, static_cast<std::uint32_t>(text.size()));
-      bytes.append(text);
-    }
-  };
-  (append(fields), ...);
-  return bytes;
-}
-
-std::string mcapRecord(McapOp op, const std::string& content) {
-  return static_cast<char>(op) + fieldsOf(std::uint64_t{content.size()}) + content;
 }
 
 /// Writes a ROS 2 message in CDR: after 4 bytes of header, values are at multiples of their size.
@@ -149,8 +128,9 @@ class McapWriter : public RecordingWriter {
           {"event_camera_msgs/msg/EventPacket", kEventPacketSchema, name + "/events"});
       channels_.push_back({"sensor_msgs/msg/CameraInfo", kCameraInfoSchema, name + "/camera_info"});
     }
-    write(std::string(kMcapMagic) +
-          mcapRecord(McapOp::kHeader, fieldsOf("ros2", "event-fusion-mapper")) + channelRecords());
+    std::string begin(kMcapMagic);
+    appendMcapRecord(begin, McapHeader{"ros2", "event-fusion-mapper"});
+    write(begin + channelRecords());
   }
 
   void addEvents(std::size_t camera, const std::vector<Event>& events) override {
@@ -176,12 +156,11 @@ class McapWriter : public RecordingWriter {
 
   void close() override {
     finishChunk();
-    // The data have no checksum: each chunk has one.
-    write(mcapRecord(McapOp::kDataEnd, fieldsOf(std::uint32_t{0})));
+    write(McapDataEnd{});  // the data have no checksum: each chunk has one
     std::string summary = channelRecords() + chunk_indexes_ + statistics();
-    summary += static_cast<char>(McapOp::kFooter);
-    constexpr std::uint64_t kNoOffsets = 0;
-    summary += fieldsOf(std::uint64_t{kMcapFooterContent}, position_, kNoOffsets);
+    McapFooter footer = {position_};
+    appendMcapRecord(summary, footer);
+    summary.resize(summary.size() - sizeof(footer.checksum));
     appendNumber(summary, checksumOf(summary));
     write(summary.append(kMcapMagic));
     output_.close();
@@ -212,10 +191,8 @@ class McapWriter : public RecordingWriter {
     std::uint16_t id = 0;
     for (const Channel& channel : channels_) {
       ++id;
-      schemas +=
-          mcapRecord(McapOp::kSchema, fieldsOf(id, channel.schema_name, "ros2msg", channel.schema));
-      const char* metadata = "";
-      channels += mcapRecord(McapOp::kChannel, fieldsOf(id, id, channel.topic, "cdr", metadata));
+      appendMcapRecord(schemas, McapSchema{id, channel.schema_name, "ros2msg", channel.schema});
+      appendMcapRecord(channels, McapChannel{id, id, channel.topic, "cdr", {}});
     }
     return schemas + channels;
   }
@@ -262,14 +239,10 @@ class McapWriter : public RecordingWriter {
   void addMessage(int channel, std::int64_t t_ns, const std::string& data) {
     const auto log_ns = static_cast<std::uint64_t>(t_ns);
     Channel& entry = channels_[static_cast<std::size_t>(channel - 1)];
-    entry.index += fieldsOf(log_ns, std::uint64_t{chunk_.size()});
+    appendMcapFields(entry.index, log_ns, std::uint64_t{chunk_.size()});
     const auto number = static_cast<std::uint32_t>(entry.messages++);
-    const std::uint64_t published_ns = log_ns;
-    const std::string head =
-        fieldsOf(static_cast<std::uint16_t>(channel), number, log_ns, published_ns);
-    chunk_.push_back(static_cast<char>(McapOp::kMessage));
-    appendNumber(chunk_, std::uint64_t{head.size() + data.size()});
-    chunk_.append(head).append(data);
+    appendMcapRecord(
+        chunk_, McapMessage{static_cast<std::uint16_t>(channel), number, log_ns, log_ns}, data);
     chunk_span_.add(log_ns);
     file_span_.add(log_ns);
     if (chunk_.size() >= kMcapChunkBytes) finishChunk();
@@ -284,11 +257,9 @@ class McapWriter : public RecordingWriter {
       throw std::runtime_error(file_.path().string() + ": " + ZSTD_getErrorName(size));
     }
     packed.resize(size);
-    const std::uint64_t unpacked_size = chunk_.size();
-    const std::string times = fieldsOf(chunk_span_.first_ns, chunk_span_.last_ns);
+    const auto [first_ns, last_ns] = chunk_span_;
     const std::uint64_t begin = position_;
-    write(mcapRecord(McapOp::kChunk,
-                     times + fieldsOf(unpacked_size, checksumOf(chunk_), "zstd", size) + packed));
+    write(McapChunk{first_ns, last_ns, chunk_.size(), checksumOf(chunk_), "zstd", size}, packed);
 
     const std::uint64_t end = position_;
     std::string positions;
@@ -296,13 +267,13 @@ class McapWriter : public RecordingWriter {
     for (Channel& channel : channels_) {
       ++id;
       if (channel.index.empty()) continue;
-      positions += fieldsOf(id, position_);
-      write(mcapRecord(McapOp::kMessageIndex, fieldsOf(id, channel.index)));
+      appendMcapFields(positions, id, position_);
+      write(McapMessageIndex{id, channel.index});
       channel.index.clear();
     }
-    chunk_indexes_ += mcapRecord(McapOp::kChunkIndex,
-                                 times + fieldsOf(begin, end - begin, positions, position_ - end,
-                                                  "zstd", size, unpacked_size));
+    appendMcapRecord(chunk_indexes_,
+                     McapChunkIndex{first_ns, last_ns, begin, end - begin, positions,
+                                    position_ - end, "zstd", size, chunk_.size()});
     ++chunks_;
     chunk_.clear();
     chunk_span_ = {};
@@ -314,15 +285,24 @@ class McapWriter : public RecordingWriter {
     std::uint16_t id = 0;
     for (const Channel& channel : channels_) {
       messages += channel.messages;
-      counts += fieldsOf(++id, channel.messages);
+      appendMcapFields(counts, ++id, channel.messages);
     }
-    constexpr std::uint32_t kNone = 0;  // attachments, metadata
-    const auto schemas = static_cast<std::uint16_t>(channels_.size());
-    return mcapRecord(McapOp::kStatistics,
-                      fieldsOf(messages, schemas, std::uint32_t{schemas}, kNone, kNone, chunks_,
-                               messages > 0 ? file_span_.first_ns : 0, file_span_.last_ns, counts));
+    McapStatistics statistics = {messages, id, id};
+    statistics.chunks = chunks_;
+    statistics.first_log_ns = messages > 0 ? file_span_.first_ns : 0;
+    statistics.last_log_ns = file_span_.last_ns;
+    statistics.channel_messages = counts;
+    std::string record;
+    appendMcapRecord(record, statistics);
+    return record;
   }
 
+  template <typename Record>
+  void write(const Record& record, std::string_view data = {}) {
+    std::string bytes;
+    appendMcapRecord(bytes, record, data);
+    write(bytes);
+  }
   void write(const std::string& bytes) {
     output_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     position_ += bytes.size();

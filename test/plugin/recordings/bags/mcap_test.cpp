@@ -16,6 +16,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/bags/bag_source.h"
+#include "plugin/recordings/bags/mcap_records.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
