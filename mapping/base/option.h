@@ -19,6 +19,13 @@ namespace efm {
 /// Section and key of an option: ("dsi", "num_planes").
 using OptionId = std::pair<std::string, std::string>;
 
+/// The value that was chosen for an option, and the reason in words.
+struct ChosenOption {
+  std::string key;  ///< For example "min_depth_m".
+  double value = 0;
+  std::string reason;
+};
+
 /// Name of a value in an error message. Most code does not know the section.
 struct OptionName {
   template <typename Text, typename = std::enable_if_t<std::is_convertible_v<Text, std::string>>>

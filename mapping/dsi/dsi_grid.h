@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/events/event_fate.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
 
@@ -28,22 +29,6 @@ void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
   auto row = values.begin();
   for (int y = 0; y < part.rows; ++y, row += part.cols) std::copy_n(row, part.cols, part[y]);
 }
-
-/// Counts of votes. One vote is one used event on one plane:
-/// cast + outside_view + behind_camera = events x planes.
-struct VoteCounts {
-  std::uint64_t cast = 0;
-  std::uint64_t outside_view = 0;   ///< Votes that have a neighbouring pixel outside the view.
-  std::uint64_t behind_camera = 0;  ///< Votes whose point is behind the camera that saw the event.
-
-  std::uint64_t total() const { return cast + outside_view + behind_camera; }
-  VoteCounts& operator+=(const VoteCounts& other) {
-    cast += other.cast;
-    outside_view += other.outside_view;
-    behind_camera += other.behind_camera;
-    return *this;
-  }
-};
 
 /// The voxels of a DSI: the pixels of the reference view on each depth plane.
 struct DsiGrid {

@@ -92,6 +92,18 @@ class Trajectory {
   std::vector<StampedPose> poses_;  // strictly increasing times
 };
 
+/// The tracker's velocity error, constant within one window, in the rig's frame:
+/// T_world_true(t) = T_world_rig(t) * displacement(t - t_ref). The pose at the reference time
+/// stays, so the keyframe keeps its pose.
+struct VelocityCorrection {
+  Eigen::Vector3d linear_m_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
+
+  /// Returns T_rig_true at a time after (negative: before) the reference time: the exponential map
+  /// of SE(3), a screw motion.
+  Rigid3 displacement(double since_s) const;
+};
+
 /// The motion of one camera in the reference view during one segment of the trajectory. Thousands
 /// of poses are computed per segment, so terms that do not depend on time are computed once.
 ///

@@ -45,28 +45,6 @@ void FusionMapperOptions::validate() const {
   }
 }
 
-EventCounts MapperCounts::total() const {
-  EventCounts sum;
-  for (const EventCounts& camera : cameras) sum += camera;
-  return sum;
-}
-
-MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
-  cameras.resize(std::max(cameras.size(), other.cameras.size()));
-  for (std::size_t i = 0; i < other.cameras.size(); ++i) cameras[i] += other.cameras[i];
-  event_uses += other.event_uses;
-  votes += other.votes;
-  keyframes += other.keyframes;
-  keyframes_without_pose += other.keyframes_without_pose;
-  windows_without_events += other.windows_without_events;
-  dropped_windows += other.dropped_windows;
-  silent_subintervals += other.silent_subintervals;
-  sorted_events += other.sorted_events;
-  late_events += other.late_events;
-  duplicate_poses += other.duplicate_poses;
-  return *this;
-}
-
 FusionMapper::FusionMapper(const FusionMapperOptions& options)
     : options_(options), trajectory_(options.trajectory) {
   options_.validate();

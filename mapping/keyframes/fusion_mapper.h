@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,7 +10,6 @@
 
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/events/event.h"
-#include "mapping/events/event_fate.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/lens.h"
@@ -21,6 +19,7 @@
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/keyframes/keyframe_policy.h"
+#include "mapping/keyframes/mapper_counts.h"
 
 namespace efm {
 
@@ -43,52 +42,6 @@ struct FusionMapperOptions {
     return only_window ? TimeLimits{only_window->t0_ns, only_window->t1_ns} : limits;
   }
   void validate() const;
-};
-
-/// The reason why a window was dropped.
-enum class DropReason {
-  kOverload,    ///< Too much input waited, or input was dropped.
-  kTooLarge,    ///< The window has more events than the live queue holds.
-  kJump,        ///< The tracker jumped within the window.
-  kNoPose,      ///< The poses of the window did not come in time.
-  kNoScene,     ///< The window showed no scene, which automatic options need.
-  kError,       ///< The window could not be mapped.
-  kPaused,      ///< Map updating was disabled.
-  kClockReset,  ///< The window was waiting at a clock reset.
-};
-
-struct DropReasonRow {
-  DropReason reason;
-  const char* key;   ///< The key in report.json.
-  const char* text;  ///< The words after "3 windows".
-};
-inline constexpr DropReasonRow kDropReasons[] = {
-    {DropReason::kOverload, "overload", "for overload"},
-    {DropReason::kTooLarge, "too_large", "larger than the queue"},
-    {DropReason::kJump, "jump", "across a jump of the tracker"},
-    {DropReason::kNoPose, "no_pose", "without poses"},
-    {DropReason::kNoScene, "no_scene", "without a scene"},
-    {DropReason::kError, "error", "for errors"},
-    {DropReason::kPaused, "paused", "while map updating was disabled"},
-    {DropReason::kClockReset, "clock_reset", "at a clock reset"},
-};
-using DroppedWindows = CountsBy<DropReason, std::size(kDropReasons)>;
-
-struct MapperCounts {
-  std::vector<EventCounts> cameras;
-  std::uint64_t event_uses = 0;  ///< Events that voted, summed over keyframes, which may overlap.
-  VoteCounts votes;
-  std::uint64_t keyframes = 0;
-  std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
-  std::uint64_t windows_without_events = 0;  ///< Skipped: no selected camera has events.
-  DroppedWindows dropped_windows;            ///< Dropped by `dropWindow` and `dropWindowsBefore`.
-  std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
-  std::uint64_t sorted_events = 0;  ///< Events that came after a newer event of their camera.
-  std::uint64_t late_events = 0;    ///< See `FusionMapper::dropLate`.
-  std::uint64_t duplicate_poses = 0;
-
-  EventCounts total() const;
-  MapperCounts& operator+=(const MapperCounts& other);
 };
 
 /// Maps events and poses to keyframes: buffers the input, and maps a window once its events and

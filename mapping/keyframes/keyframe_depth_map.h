@@ -7,47 +7,14 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/depth/depth_extraction.h"
-#include "mapping/dsi/dsi_grid.h"
+#include "mapping/depth/depth_map.h"
+#include "mapping/events/event_fate.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
-#include "mapping/motion/event_contrast.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
-
-/// The stages of the mapping, for time measurements. The mapping itself never reads a clock.
-enum class Stage {
-  kFilter,  ///< Removal of noise from new events.
-  kSweep,   ///< Packets, back-projection, votes and fusion.
-  kDepth,   ///< Extraction of the depth map.
-};
-
-/// Callbacks at the beginning and the end of a stage, in the thread that runs the mapper.
-class StageHook {
- public:
-  virtual ~StageHook() = default;
-  virtual void begin(Stage stage) = 0;
-  virtual void end(Stage stage) = 0;
-};
-
-/// Reports a stage for the lifetime of this object.
-class StageScope {
- public:
-  /// @param hook may be null.
-  StageScope(StageHook* hook, Stage stage) : hook_(hook), stage_(stage) {
-    if (hook_ != nullptr) hook_->begin(stage_);
-  }
-  ~StageScope() {
-    if (hook_ != nullptr) hook_->end(stage_);
-  }
-  StageScope(const StageScope&) = delete;
-  StageScope& operator=(const StageScope&) = delete;
-
- private:
-  StageHook* hook_;
-  Stage stage_;
-};
 
 /// A keyframe's depth map from one camera alone, in the keyframe's view.
 struct CameraDepthMap {

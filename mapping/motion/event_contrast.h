@@ -14,18 +14,6 @@
 
 namespace efm {
 
-/// The tracker's velocity error, constant within one window, in the rig's frame:
-/// T_world_true(t) = T_world_rig(t) * displacement(t - t_ref). The pose at the reference time
-/// stays, so the keyframe keeps its pose.
-struct VelocityCorrection {
-  Eigen::Vector3d linear_m_s = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
-
-  /// Returns T_rig_true at a time after (negative: before) the reference time: the exponential map
-  /// of SE(3), a screw motion.
-  Rigid3 displacement(double since_s) const;
-};
-
 /// Returns the corrected motion during a window. In [t0, t1) it has poses at the times of
 /// `trajectory`, and one at the reference time.
 /// @param trajectory has a pose at the reference time.

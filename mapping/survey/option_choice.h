@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/survey/scene_depths.h"
@@ -30,13 +31,6 @@ struct AutomaticOptions {
     visit("stride_s", self.stride_s);
   }
   bool any() const { return min_depth_m || max_depth_m || num_planes || window_s || stride_s; }
-};
-
-/// The value that was chosen for an option, and the reason in words.
-struct ChosenOption {
-  std::string key;  ///< For example "min_depth_m".
-  double value = 0;
-  std::string reason;
 };
 
 /// The result of `chooseOptions`.

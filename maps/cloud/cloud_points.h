@@ -26,6 +26,15 @@ struct CloudPoint {
   float sigma = std::numeric_limits<float>::quiet_NaN();
 };
 
+/// A point of a keyframe in its reference view. It is float like the depth map, so a stored
+/// keyframe has exactly the points of the map, anywhere in the world.
+struct ViewPoint {
+  Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();  ///< Metres, frame `ref`.
+  float confidence = 0;                             ///< Fused ray density at the point, above 0.
+  /// Standard deviation of depth, metres; NaN if it is not known.
+  float sigma = std::numeric_limits<float>::quiet_NaN();
+};
+
 /// Returns a text for messages, with all digits: "(1, 2.5, -3) with confidence 7".
 std::string pointText(const CloudPoint& point);
 

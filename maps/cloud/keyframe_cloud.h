@@ -16,15 +16,6 @@
 
 namespace efm {
 
-/// A point of a keyframe in its reference view. It is float like the depth map, so a stored
-/// keyframe has exactly the points of the map, anywhere in the world.
-struct ViewPoint {
-  Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();  ///< Metres, frame `ref`.
-  float confidence = 0;                             ///< Fused ray density at the point, above 0.
-  /// Standard deviation of depth, metres; NaN if it is not known.
-  float sigma = std::numeric_limits<float>::quiet_NaN();
-};
-
 /// Returns the points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth
 /// and a confidence above 0, row by row. sigma_Z = Z^2 * sigma_(1/Z): Z is the inverse of the
 /// inverse depth, whose variance the keyframe has.

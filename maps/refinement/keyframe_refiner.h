@@ -46,14 +46,6 @@ struct RefinementOptions {
   void validate() const { requireFields(*this); }
 };
 
-struct RefinementCounts {
-  std::uint64_t registered = 0;     ///< Keyframes that were registered with earlier ones.
-  std::uint64_t loop_checks = 0;    ///< Candidates that were registered.
-  std::uint64_t loops = 0;          ///< Candidates that became factors.
-  std::uint64_t loops_dropped = 0;  ///< Loops that other factors contradicted.
-  std::uint64_t failed_solves = 0;  ///< Failed solves: the poses stayed.
-};
-
 /// Finds loops, verifies them, and solves the keyframes since the oldest new loop.
 class LoopCloser {
  public:

@@ -9,11 +9,9 @@
 
 #include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
+#include "maps/refinement/refinement_state.h"
 
 namespace efm {
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // Decompositions of small symmetric matrices. They are compiled once, in pose_refinement.cpp,
 // because each takes the compiler seconds.

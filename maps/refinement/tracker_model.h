@@ -9,41 +9,10 @@
 #include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
+#include "maps/refinement/refinement_state.h"
 #include "maps/refinement/registration_points.h"
 
 namespace efm {
-
-/// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 if the
-/// tracker states nothing.
-struct NoiseScale {
-  double translation = 1;
-  double rotation = 1;
-};
-
-/// The errors of the poses of a tracker: noise, independent for each keyframe, and drift, which
-/// grows along the path: as a random walk up to one metre, in proportion to the path length beyond.
-/// All are standard deviations on each axis, 0 to 1e3. The defaults are those of good
-/// visual-inertial odometry.
-struct TrackerErrors {
-  double noise_m = 0.01;
-  double noise_rad = 0.5 * kRadiansPerDegree;
-  double drift_m = 0.01;  ///< Per metre of path.
-  double drift_rad = 0.5 * kRadiansPerDegree;
-
-  template <typename Self, typename Visit>
-  static void fields(Self& self, Visit&& visit) {
-    const Allowed range = Allowed::from(0, 1000, "from 0 to 1000");
-    visit("tracker_noise_m", self.noise_m, range);
-    visit("tracker_noise_deg", self.noise_rad, range.in(kRadiansPerDegree));
-    visit("tracker_drift", self.drift_m, range);
-    visit("tracker_drift_deg_per_m", self.drift_rad, range.in(kRadiansPerDegree));
-  }
-  void validate() const { requireFields(*this); }
-  /// Returns the covariance of a pose relative to the pose without noise. Never singular.
-  Matrix6d noiseCovariance(const NoiseScale& scale = {}) const;
-  /// Returns the covariance of the motion without noise along a path. Never singular.
-  Matrix6d driftCovariance(double path_length_m) const;
-};
 
 /// A motion between two keyframes by the tracker, compared with the motion by their points.
 struct MotionSample {

@@ -32,7 +32,7 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
     const std::lock_guard<std::mutex> lock(made_mutex_);  // called in the mapper's own thread
     made_.push_back(keyframe);
   };
-  mapper_ = Mapper::make(options, std::move(callbacks));
+  mapper_ = std::make_shared<Mapper>(options, std::move(callbacks));
 }
 
 /// Runs a step. @return false if it throws. The run's error is the first exception.

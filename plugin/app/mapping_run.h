@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "event_fusion/engine.h"
 #include "plugin/app/program.h"
 #include "plugin/app/progress.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/map_watcher.h"
-#include "plugin/session/mapper.h"
 #include "plugin/session/recording_statistics.h"
 #include "plugin/session/sample.h"
 

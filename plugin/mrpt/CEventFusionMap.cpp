@@ -232,7 +232,8 @@ mrpt::maps::CMetricMap* CEventFusionMap::internal_CreateFromMapDefinition(
 CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(options) {}
 
 void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
-  cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
+  cloud_.insert(keyframes_.size(), pointsInWorld(*keyframe.points, keyframe.T_world_ref),
+                keyframe.T_world_ref);
   keyframes_.push_back(keyframe);
   simple_points_.reset();
 }
@@ -242,10 +243,10 @@ void CEventFusionMap::moveKeyframe(std::size_t keyframe, const Rigid3& T_world_r
   const Rigid3 T_before_ref = std::exchange(stored.T_world_ref, T_world_ref);
   cloud_.remove(keyframe);
   try {
-    cloud_.insert(keyframe, worldPointsOf(stored), T_world_ref);
+    cloud_.insert(keyframe, pointsInWorld(*stored.points, stored.T_world_ref), T_world_ref);
   } catch (const std::invalid_argument&) {
     stored.T_world_ref = T_before_ref;
-    cloud_.insert(keyframe, worldPointsOf(stored), T_before_ref);
+    cloud_.insert(keyframe, pointsInWorld(*stored.points, stored.T_world_ref), T_before_ref);
     throw;
   }
   simple_points_.reset();

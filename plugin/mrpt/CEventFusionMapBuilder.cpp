@@ -69,13 +69,13 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  auto next =
-      Mapper::make(builder_options,
-                   Mapper::Callbacks{hosts(&CEventFusionMapBuilder::callback_),
-                                     hosts(&CEventFusionMapBuilder::map_callback_),
-                                     [this](const std::string& text) { MRPT_LOG_WARN(text); },
-                                     [this](const std::string& text) { MRPT_LOG_INFO(text); }},
-                   earlier);
+  auto next = std::make_shared<Mapper>(
+      builder_options,
+      Mapper::Callbacks{hosts(&CEventFusionMapBuilder::callback_),
+                        hosts(&CEventFusionMapBuilder::map_callback_),
+                        [this](const std::string& text) { MRPT_LOG_WARN(text); },
+                        [this](const std::string& text) { MRPT_LOG_INFO(text); }},
+      earlier);
   // Stopped without the lock: the mapper's thread may run a callback that uses the builder.
   if (const auto former = mapper()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
+#include "event_fusion/engine.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/options/option_file.h"
-#include "plugin/session/mapper.h"
 
 namespace efm {
 

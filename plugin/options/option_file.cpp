@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "event_fusion/engine.h"
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"
 #include "plugin/options/option_keys.h"
@@ -223,6 +224,37 @@ std::optional<std::string> OptionReader::wrongOption(const OptionError& error) c
 std::string OptionReader::given(std::string_view section, std::string_view key) const {
   const auto found = given_.find({std::string(section), std::string(key)});
   return found == given_.end() ? std::string() : found->second.text;
+}
+
+Options::Options() : reader_(std::make_shared<OptionReader>()) {}
+
+Options::Options(const EventFusionOptions& values)
+    : reader_(std::make_shared<OptionReader>(values)), as_they_are_(true) {}
+
+template <typename Change>
+void Options::change(const Change& change) {
+  OptionReader reader = *reader_;
+  change(reader);
+  reader_ = std::make_shared<OptionReader>(std::move(reader));
+  as_they_are_ = false;
+}
+
+void Options::set(std::string_view key, std::string_view value) {
+  const std::size_t dot = key.find('.');
+  if (dot == std::string_view::npos) reject("option {}: expected section.key", inQuotes(key));
+  const std::string_view section = key.substr(0, dot);
+  change([&](OptionReader& reader) {
+    reader.set(section, key.substr(dot + 1), value,
+               {fmt::format("options: [{}]", printable(section)), {}});
+  });
+}
+
+void Options::read(const std::filesystem::path& ini) {
+  change([&](OptionReader& reader) { reader.readFile(ini); });
+}
+
+EventFusionOptions Options::values() const {
+  return as_they_are_ ? reader_->unchecked() : reader_->options();
 }
 
 }  // namespace efm

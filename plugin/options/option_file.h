@@ -48,6 +48,8 @@ class OptionReader {
   /// @throws std::invalid_argument if a value is out of range. If two values contradict each other,
   /// the error begins with the value that was given last.
   EventFusionOptions options() const;
+  /// Returns the values without a check.
+  const EventFusionOptions& unchecked() const { return options_; }
 
   /// Returns where and how an option was given: "rig.ini:3: [dsi] num_planes = 0", or "--set
   /// dsi.num_planes=0". Empty if it was not given.

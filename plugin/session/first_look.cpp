@@ -26,8 +26,11 @@ EventPacket subsampled(const EventPacket& packet) {
     length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
   }
   const auto limit = static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s));
-  return {packet.camera,           packet.calibration, chosenEvenly(packet.events, limit),
-          packet.covered_until_ns, packet.t_ns,        packet.checked};
+  EventPacket chosen{
+      packet.camera,           packet.calibration, chosenEvenly(packet.events, limit),
+      packet.covered_until_ns, packet.t_ns,        packet.checked};
+  chosen.num_cameras = packet.num_cameras;
+  return chosen;
 }
 
 /// Returns the warning about the poses. A known mistake explains more than different depths do.

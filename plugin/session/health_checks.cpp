@@ -164,6 +164,7 @@ void Findings::use(const DepthPlanesOptions& planes, const std::vector<ChosenOpt
 
 std::optional<TimeSpan> Findings::events() const {
   std::optional<TimeSpan> events = recording.eventSpan();
+  if (!events && session) events = session->events;
   if (events) events->last_ns = std::min(events->last_ns, until_ns);
   return events;
 }

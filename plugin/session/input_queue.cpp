@@ -30,7 +30,9 @@ bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns 
 }
 
 EventPacket withoutEvents(const EventPacket& packet) {
-  return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
+  EventPacket empty{packet.camera, packet.calibration, {}, packet.covered_until_ns};
+  empty.num_cameras = packet.num_cameras;
+  return empty;
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/refinement/keyframe_refiner.h"
+#include "maps/refinement/refinement_state.h"
 
 namespace efm {
 
@@ -23,22 +24,6 @@ struct MapRefinementOptions {
   /// refine each keyframe before the next one is made; the same recording gives the same map.
   bool background = false;
   RefinementOptions refiner;
-};
-
-/// State of a refinement so far.
-struct RefinementState {
-  Rigid3 T_world_odom;          ///< Maps the tracker's newest poses to the refined world.
-  Rigid3 T_world_ref_denoised;  ///< Pose of the newest keyframe, without its noise.
-  Matrix6d covariance = Matrix6d::Zero();  ///< Covariance of a pose there: see KeyframeRefiner.
-  RefinementCounts counts;
-  TrackerErrors tracker;    ///< Estimated errors of the tracker.
-  std::size_t waiting = 0;  ///< Number of keyframes that are not refined yet.
-  /// Number of errors so far. If its refinement fails, a keyframe keeps the tracker's motion.
-  std::uint64_t failures = 0;
-  std::string last_error;   ///< Text of the last error; empty without errors.
-  double seconds = 0;       ///< Time spent refining.
-  double cpu_seconds = 0;   ///< Processor time spent refining.
-  double most_seconds = 0;  ///< Longest time spent on one keyframe.
 };
 
 /// Returns the covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the

@@ -24,6 +24,26 @@ void look(Add add) {
   }
 }
 
+/// Measures the stages of the mapping, which do not overlap.
+class StageTimer : public StageHook {
+ public:
+  /// @param clock processor time of all threads of the mapping.
+  StageTimer(StageTimes& times, const ProcessorClock& clock) : times_(times), clock_(clock) {}
+
+  void begin(Stage stage) override {
+    double StageSeconds::*const sum = stage == Stage::kFilter  ? &StageSeconds::filter
+                                      : stage == Stage::kSweep ? &StageSeconds::sweep
+                                                               : &StageSeconds::depth;
+    scope_.emplace(times_.real.*sum, times_.cpu.*sum, clock_);
+  }
+  void end(Stage) override { scope_.reset(); }
+
+ private:
+  StageTimes& times_;
+  const ProcessorClock& clock_;
+  std::optional<SecondsScope> scope_;
+};
+
 }  // namespace
 
 MappingSession::MappingSession(const EventFusionOptions& options)

@@ -107,6 +107,7 @@ void RigAssembly::applyOptions(EventPacket& packet) {
 }
 
 void RigAssembly::noteAnnouncement(const EventPacket& packet) {
+  stated_cameras_ = std::max(stated_cameras_, packet.num_cameras);
   if (announced_) return;
   if (packet.events.empty()) {
     if (packet.covered_until_ns) announced_ns_[packet.camera] = *packet.covered_until_ns;
@@ -129,7 +130,8 @@ bool RigAssembly::isReady(std::int64_t begin_ns, bool has_poses) {
 bool RigAssembly::isKnown() const {
   const auto count = static_cast<std::size_t>(num_cameras_);
   if (!waiting_.empty() || count == 0) return false;
-  return announced_.value_or(false) || time_offsets_ns_.size() == count ||
+  return announced_.value_or(false) || stated_cameras_ == num_cameras_ ||
+         time_offsets_ns_.size() == count ||
          (setup_.calibration && setup_.calibration->rig.cameras.size() == count);
 }
 

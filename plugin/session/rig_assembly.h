@@ -38,8 +38,8 @@ class RigAssembly {
   /// Returns whether the rig is complete with a packet that begins at this time, on the clock of
   /// the poses. It is complete more than a second after the recording's first event, for any length
   /// of packets. It is complete at once if there are poses and all cameras are known. They are
-  /// known from the options, or if the recording starts with one empty packet per camera whose
-  /// `covered_until_ns` is the time of the first event.
+  /// known from the options, from a packet that has their number, or if the recording starts with
+  /// one empty packet per camera whose `covered_until_ns` is the time of the first event.
   bool isReady(std::int64_t begin_ns, bool has_poses);
   /// Completes the rig: a new camera is an error from now on.
   void complete() { complete_ = true; }
@@ -77,6 +77,7 @@ class RigAssembly {
   std::optional<std::int64_t> first_ns_, newest_begin_ns_;  // begins of packets with events
   bool complete_ = false;
   std::map<int, std::int64_t> announced_ns_;  // end of each camera's empty packets
+  int stated_cameras_ = 0;                    // number that a packet has
   std::optional<bool> announced_;  // true if all cameras were announced; set at the first event
   std::set<int> recalibrated_;
   std::map<int, std::vector<EventPacket>> waiting_;  // by camera

@@ -33,6 +33,7 @@ struct EventPacket {
   std::optional<std::int64_t> skipped_until_ns = std::nullopt;
   /// The camera's first packet in the rawlog (a CObservationEvents); null for other formats.
   std::shared_ptr<const void> original = nullptr;
+  int num_cameras = 0;  ///< Number of cameras of the rig; 0: the sender does not know it.
 };
 
 /// A pose of a tracker: T_world_rig = T_world_body * T_body_rig.

@@ -12,12 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
-#include "mapping/keyframes/fusion_mapper.h"
-#include "mapping/keyframes/keyframe_depth_map.h"
-#include "mapping/survey/option_choice.h"
-#include "plugin/session/map_refinement.h"
+#include "mapping/keyframes/mapper_counts.h"
+#include "maps/refinement/refinement_state.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {
@@ -75,26 +74,6 @@ class SecondsScope {
   ProcessorClock clock_;
   double cpu_begin_s_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
-
-/// Measures the stages of the mapping, which do not overlap.
-class StageTimer : public StageHook {
- public:
-  /// @param clock processor time of all threads of the mapping.
-  StageTimer(StageTimes& times, const ProcessorClock& clock) : times_(times), clock_(clock) {}
-
-  void begin(Stage stage) override {
-    double StageSeconds::*const sum = stage == Stage::kFilter  ? &StageSeconds::filter
-                                      : stage == Stage::kSweep ? &StageSeconds::sweep
-                                                               : &StageSeconds::depth;
-    scope_.emplace(times_.real.*sum, times_.cpu.*sum, clock_);
-  }
-  void end(Stage) override { scope_.reset(); }
-
- private:
-  StageTimes& times_;
-  const ProcessorClock& clock_;
-  std::optional<SecondsScope> scope_;
 };
 
 /// Returns a time for the user, exact, and its distance from the recording's start, rounded to

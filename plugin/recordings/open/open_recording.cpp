@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "event_fusion/engine.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/joined_recording.h"
 #include "plugin/recordings/open/mrpt_library.h"
@@ -413,6 +414,18 @@ std::vector<TruthDepth> openTruth(const RecordingSource& source) {
     truth.insert(truth.end(), found.begin(), found.end());
   }
   return truth;
+}
+
+std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path>& files,
+                                         const Overrides& overrides) {
+  overrides.limits.validate();
+  RecordingSource source;
+  source.files = files;
+  source.poses = overrides.poses;
+  source.calibration = overrides.calibration;
+  source.hand_eye = overrides.hand_eye;
+  source.limits = overrides.limits;
+  return openRecording(source);
 }
 
 }  // namespace efm

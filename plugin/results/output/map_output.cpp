@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "event_fusion/engine.h"
 #include "mapping/base/picture_file.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/io/point_cloud_file.h"
@@ -347,6 +348,13 @@ void MapOutput::writeReport(const std::string& json) {
     not_on_disk_.clear();
   });
   removeFile(folder_ / RunMark::kName);
+}
+
+void writePly(const std::filesystem::path& file, const MapCloud& cloud) {
+  const std::vector<PointColour> colours = coloursByHeight(cloud, Eigen::Vector3d::UnitZ());
+  AtomicFile atomic(file);
+  byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours); })(atomic.temporary());
+  atomic.replace();
 }
 
 }  // namespace efm

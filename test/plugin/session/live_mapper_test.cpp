@@ -113,7 +113,7 @@ TEST(LiveMapper, AHostMayDropItsLastReferenceInEachCallback) {
     if (name == "keyframe") callbacks.on_keyframe = [host](const auto&) { host->drop(); };
     if (name == "map") callbacks.on_map = [host](const auto&) { host->drop(); };
     if (name == "log") callbacks.warn = [host](const auto&) { host->drop(); };
-    host->mapper = Mapper::make(live(), callbacks);
+    host->mapper = std::make_shared<Mapper>(live(), callbacks);
     const std::weak_ptr<Mapper> mapper = host->mapper;
     for (const Sample& sample : samples) host->mapper->add(sample);
     host->fed.set_value();

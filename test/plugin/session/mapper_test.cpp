@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/mapper.h"
+#include "event_fusion/engine.h"
 
 #include <gmock/gmock.h>
 
@@ -49,7 +49,7 @@ void expectConsistent(const MapSnapshot& map, const GlobalCloudOptions& options)
     const StoredKeyframe& keyframe = map.keyframes[i];
     EXPECT_EQ(keyframe.t_ref_ns, map.trajectory[i].t_ns);
     EXPECT_TRUE(isSame(keyframe.T_world_ref, map.trajectory[i].T_world_rig)) << "keyframe " << i;
-    cloud.insert(i, worldPointsOf(keyframe), keyframe.T_world_ref);
+    cloud.insert(i, pointsInWorld(*keyframe.points, keyframe.T_world_ref), keyframe.T_world_ref);
   }
   EXPECT_TRUE(test::sameBits(*cloud.points(), *map.points));
 }
@@ -72,7 +72,7 @@ TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsis
     EXPECT_EQ(mapper->keyframes()->points, nullptr) << "they cost an export";
   };
   callbacks.on_map = [&](const auto& map) { expectConsistent(*map, options.cloud); };
-  mapper = Mapper::make(options, callbacks, first->keyframes);
+  mapper = std::make_shared<Mapper>(options, callbacks, first->keyframes);
   EXPECT_EQ(mapper->snapshot()->trajectory.size(), count);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     mapper->add(samples[i]);
@@ -192,7 +192,7 @@ TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
     }
     mapper->stop();
   };
-  mapper = Mapper::make(in(syntheticOptions()), callbacks);
+  mapper = std::make_shared<Mapper>(in(syntheticOptions()), callbacks);
   for (const Sample& sample : announced(SyntheticRecording())) mapper->add(sample);
   mapper->finish();
   EXPECT_EQ(calls, 1) << "of three";
@@ -232,7 +232,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
       ++thrown;
       throw 5;
     };
-    mapper = Mapper::make(options, callbacks);
+    mapper = std::make_shared<Mapper>(options, callbacks);
     addPatiently(*mapper, samples);
     const std::string error = messageOf([&] { mapper->finish(); });
 

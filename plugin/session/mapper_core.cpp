@@ -1,0 +1,566 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/mapper_core.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/session/health_checks.h"
+
+namespace efm {
+namespace {
+
+/// Snapshots of the map may take 1 / this of the time.
+constexpr int kMapCostDivisor = 20;
+
+std::string errorText() {
+  try {
+    throw;
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "an exception of another type";
+  }
+}
+
+EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const RigSetup> setup) {
+  options.rig.setup = std::move(setup);
+  return options;
+}
+
+}  // namespace
+
+MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
+                       const std::vector<StoredKeyframe>& earlier)
+    : options_(options.live),
+      mapper_options_(options.mapper),
+      callbacks_(std::move(callbacks)),
+      setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
+      poses_(statisticsOptions(withSetup(options, setup_))),
+      session_(withSetup(options, setup_)) {
+  for (const StoredKeyframe& keyframe : earlier) {
+    session_.insertEarlier(pointsInWorld(*keyframe.points, keyframe.T_world_ref),
+                           keyframe.T_world_ref);
+    keep(keyframe);
+    forgetOldest();
+  }
+  if (!options_.enabled) return;
+  queue_ = std::make_unique<InputQueue>(options_);
+  status_ = session_.status();
+  map_ = makeSnapshot(true);
+  thread_ = std::thread([this] {  // waits: no input before the constructor returns
+    worker_ = std::this_thread::get_id();
+    run();
+    worker_ = std::thread::id();
+    const auto last = std::move(self_);  // may destroy this
+  });
+}
+
+std::shared_ptr<MapperCore> MapperCore::make(const EventFusionOptions& options, Callbacks callbacks,
+                                             const std::vector<StoredKeyframe>& earlier) {
+  const auto mapper = std::make_shared<MapperCore>(options, std::move(callbacks), earlier);
+  if (mapper->queue_) mapper->self_ = mapper;
+  return {mapper.get(), [mapper](MapperCore*) {
+            mapper->stop();
+            if (mapper->runsHere()) mapper->thread_.detach();
+          }};
+}
+
+MapperCore::~MapperCore() {
+  if (!runsHere()) stop();
+}
+
+int MapperCore::addCamera(const RigCamera& camera) {
+  camera.validate();
+  const std::lock_guard<std::mutex> lock(cameras_mutex_);
+  if (announced_) throw std::logic_error("a camera was added after the first events");
+  cameras_.push_back(camera);
+  return static_cast<int>(cameras_.size()) - 1;
+}
+
+void MapperCore::addEvents(int camera, std::vector<Event> events) {
+  const auto index = static_cast<std::size_t>(camera);
+  EventPacket packet;
+  {
+    const std::lock_guard<std::mutex> lock(cameras_mutex_);
+    if (index >= cameras_.size()) {
+      throw std::invalid_argument(fmt::format(
+          "events of camera {}: expected one of the {} added cameras", camera, cameras_.size()));
+    }
+    packet.num_cameras = static_cast<int>(cameras_.size());
+    for (std::size_t c = 0; c < cameras_.size() && !announced_; ++c) {
+      packet.camera = static_cast<int>(c);
+      packet.calibration = cameras_[c];
+      add(packet);
+    }
+    announced_ = true;
+    packet.calibration = cameras_[index];
+  }
+  packet.camera = camera;
+  packet.events = std::move(events);
+  add(std::move(packet));
+}
+
+std::vector<Warning> MapperCore::warnings() const {
+  const SessionStatus state = status();
+  const std::lock_guard<std::mutex> lock(poses_mutex_);
+  Findings findings{poses_, {}};
+  findings.use(mapper_options_.keyframe.planes, state.chosen);
+  findings.max_pose_gap_s = mapper_options_.trajectory.max_pose_gap_s;
+  findings.session = &state;
+  findings.options = &mapper_options_;
+  std::vector<Warning> warnings = warningsOf(findings);
+  if (state.events && state.poses && state.counts.keyframes == 0) {
+    addWarning(warnings, "no-keyframe", "there is no keyframe: {}",
+               whyNoKeyframe(state, mapper_options_).what());
+  }
+  return warnings;
+}
+
+void MapperCore::add(Sample sample) {
+  auto* const packet = std::get_if<EventPacket>(&sample);
+  auto* const pose = std::get_if<PoseSample>(&sample);
+  if (pose) {
+    const std::lock_guard<std::mutex> lock(poses_mutex_);
+    poses_.addPose(*pose);
+  }
+  if (queue_) {
+    if (packet) queue_->add(std::move(*packet));
+    if (pose) queue_->add(std::move(*pose));
+    return;
+  }
+  Batch batch;
+  if (packet) batch.packets.push_back(std::move(*packet));
+  if (pose) batch.poses.push_back(std::move(*pose));
+  workHere(std::move(batch));
+}
+
+void MapperCore::skip(const EventPacket& packet) {
+  if (queue_) return queue_->skip(packet);
+  if (packet.events.empty()) return;
+  Batch batch;
+  batch.packets.push_back(skippedPacket(packet));
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    paused_events_[packet.camera] += packet.events.size();
+  }
+  workHere(std::move(batch));
+}
+
+void MapperCore::finish() {
+  if (!queue_) {
+    Batch end;
+    end.ended = true;
+    return workHere(std::move(end));
+  }
+  if (runsHere()) throw std::logic_error("the mapping cannot be finished from its own callback");
+  queue_->end();
+  std::unique_lock<std::mutex> lock(mutex_);
+  ended_changed_.wait(lock, [this] { return ended_; });
+  if (end_error_) std::rethrow_exception(std::exchange(end_error_, nullptr));
+}
+
+void MapperCore::stop() {
+  if (!queue_) {
+    const std::lock_guard<std::mutex> lock(session_mutex_);  // waits for the current keyframe
+    stopped_ = true;
+    return;
+  }
+  stopped_ = true;
+  queue_->stop();
+  if (runsHere()) return;
+  const std::lock_guard<std::mutex> lock(join_mutex_);
+  if (thread_.joinable()) thread_.join();
+}
+
+/// Feeds and maps a batch in the caller's thread.
+void MapperCore::workHere(Batch batch) {
+  std::exception_ptr error;
+  feed(std::move(batch), error);
+  while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
+  }
+  if (error) std::rethrow_exception(error);
+}
+
+void MapperCore::run() {
+  std::exception_ptr error;
+  for (bool goes_on = true; goes_on;) {
+    attempt(error, Fault::kMapping, "the input", [&] { goes_on = runOnce(); });  // may lack memory
+  }
+  endRun(nullptr);  // if stopped, nobody waits for the end
+}
+
+/// @return true if more input may come.
+bool MapperCore::runOnce() {
+  std::exception_ptr error;
+  // A delayed snapshot is made when its time has come.
+  Batch batch =
+      map_changed_ ? queue_->wait(map_renewed_ + kMapCostDivisor * map_cost_) : queue_->wait();
+  do {
+    if (stopped_) return false;
+    if (batch.ended) {
+      std::exception_ptr end_error;
+      feed(std::move(batch), end_error);
+      while (mapNext(error) && !stopped_) {
+      }
+      publishMap(true, error);
+      publishState(error);
+      warnOfLosses();
+      endRun(end_error);
+      return false;
+    }
+    feed(std::move(batch), error);
+    warnOfLosses();
+    if (!mapNext(error)) break;
+    batch = queue_->take();
+  } while (true);
+  publishMap(false, error);
+  return true;
+}
+
+void MapperCore::endRun(std::exception_ptr error) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (std::exchange(ended_, true)) return;
+  end_error_ = std::move(error);
+  ended_changed_.notify_all();
+}
+
+/// Feeds the session.
+/// @param error receives the first error; in live operation only an error of the end, because
+/// `attempt` counts and logs the others.
+void MapperCore::feed(Batch batch, std::exception_ptr& error) {
+  std::exception_ptr ignored;
+  std::exception_ptr& of_input = queue_ ? ignored : error;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    if (finished_ && !queue_ && !batch.ended) {
+      throw std::logic_error("input after the end: `finish` was called");
+    }
+    for (const PoseSample& pose : batch.poses) {
+      attempt(of_input, Fault::kPose, "", [&] { session_.addPose(pose); });
+    }
+    for (const auto& missing : batch.missing) {
+      attempt(of_input, Fault::kMapping, "the choice of options",
+              [&] { session_.noteMissing(missing.first, missing.second); });
+    }
+    for (EventPacket& packet : batch.packets) {
+      attempt(of_input, Fault::kEvents, "", [&] {
+        if (packet.skipped_until_ns) {
+          session_.noteMissing(packet.camera, {*packet.skipped_until_ns, DropReason::kPaused});
+        } else {
+          session_.addEvents(std::move(packet));
+        }
+      });
+    }
+    if (batch.ended && !std::exchange(finished_, true)) {
+      attempt(error, Fault::kMapping, "the end of the input", [&] { session_.finish(); });
+    }
+  }
+  publishState(of_input);
+}
+
+/// @return true if it made a keyframe, or dropped a window in live operation.
+bool MapperCore::mapNext(std::exception_ptr& error) {
+  std::optional<KeyframeDepthMap> keyframe;
+  std::vector<std::string> warnings;
+  bool goes_on = false;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    // Within a callback in playback, the caller of the callback maps.
+    if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
+    if (queue_) {  // old windows are dropped for the newest input
+      attempt(error, Fault::kMapping, "the input that waits", [&] {
+        session_.limitHeld(options_.queueEvents() - static_cast<double>(queue_->queuedEvents()));
+      });
+    }
+    DsiSink* sink = nullptr;
+    ProcessorClock clock;
+    {
+      const std::lock_guard<std::mutex> settings(mutex_);
+      sink = sink_;
+      clock = clock_;
+    }
+    const std::size_t kept = map_so_far_.trajectory.size();
+    const std::size_t kept_keyframes = map_so_far_.keyframes.size();
+    const auto store = [this](const KeyframeDepthMap& made, const std::vector<ViewPoint>& points) {
+      keep({made.window.t_ref_ns, made.T_world_ref,
+            std::make_shared<const std::vector<ViewPoint>>(points)});
+    };
+    const bool mapped = attempt(error, Fault::kMapping, "a keyframe",
+                                [&] { keyframe = session_.next(sink, clock, store); });
+    if (!mapped) {  // the session does not have this keyframe
+      map_so_far_.trajectory.resize(kept);
+      map_so_far_.tracker_trajectory.resize(std::min(map_so_far_.tracker_trajectory.size(), kept));
+      map_so_far_.keyframes.resize(std::min(map_so_far_.keyframes.size(), kept_keyframes));
+      goes_on = queue_ && session_.dropFailedWindow();
+    }
+    if (keyframe) {
+      goes_on = true;
+      map_changed_ = true;
+      attempt(error, Fault::kMapping, "a warning",
+              [&] { warnings = warningsOfSilence(*keyframe); });
+      forgetOldest();
+      const std::lock_guard<std::mutex> published(mutex_);
+      newest_depth_ = keyframe->map.depth;
+      newest_planes_ = session_.chosen().planes;
+    }
+  }
+  if (keyframe && queue_) publishMap(false, error);
+  publishState(error);
+  for (const std::string& text : warnings) warn(text, error);
+  if (keyframe && callbacks_.on_keyframe) {
+    callBack(error, "the callback of a keyframe", [&] { callbacks_.on_keyframe(*keyframe); });
+  }
+  return goes_on;
+}
+
+/// Returns at most one warning per camera. The status counts the keyframes without its events.
+std::vector<std::string> MapperCore::warningsOfSilence(const KeyframeDepthMap& keyframe) {
+  std::vector<std::string> warnings;
+  for (const int camera : keyframe.silent_cameras) {
+    if (!silent_cameras_.insert(camera).second) continue;
+    warnings.push_back(fmt::format("camera {} had no event for the keyframe at {} s", camera,
+                                   formatSeconds(keyframe.window.t_ref_ns)));
+  }
+  return warnings;
+}
+
+/// Adds a keyframe to the map so far. If memory runs out, the caller removes the keyframe.
+void MapperCore::keep(StoredKeyframe keyframe) {
+  const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
+  map_so_far_.trajectory.push_back(pose);
+  map_so_far_.tracker_trajectory.push_back(pose);
+  map_so_far_.keyframes.push_back(std::move(keyframe));
+}
+
+/// Forgets the cloud of the oldest keyframe if there are too many, in live operation.
+void MapperCore::forgetOldest() {
+  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+  if (!options_.enabled || keyframes.size() <= std::size_t(options_.max_keyframes)) return;
+  keyframes.erase(keyframes.begin());
+}
+
+/// Makes a snapshot. Moves cloud and keyframes to their refined poses before, so that they agree.
+std::shared_ptr<MapSnapshot> MapperCore::makeSnapshot(bool with_points) {
+  session_.applyPending();
+  const std::vector<Rigid3>& T_world_ref = session_.T_world_ref();
+  std::vector<StampedPose>& trajectory = map_so_far_.trajectory;
+  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+  const std::size_t earlier = trajectory.size() - T_world_ref.size();
+  const std::size_t forgotten = trajectory.size() - keyframes.size();
+  for (std::size_t i = earlier; i < trajectory.size(); ++i) {
+    if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
+    trajectory[i].T_world_rig = T_world_ref[i - earlier];
+    if (i >= forgotten) keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
+  }
+  auto map = std::make_shared<MapSnapshot>(map_so_far_);
+  if (with_points) map->points = session_.cloud().points();
+  return map;
+}
+
+std::shared_ptr<const MapSnapshot> MapperCore::newest(bool with_points) {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return map_;
+  }
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  return makeSnapshot(with_points);
+}
+
+/// Renews the snapshot in live operation, unless this would take too much of the time.
+void MapperCore::publishMap(bool at_once, std::exception_ptr& error) {
+  const Clock::time_point begin = Clock::now();
+  const bool is_due = map_changed_ && begin - map_renewed_ >= kMapCostDivisor * map_cost_;
+  if (!is_due && !at_once) return;
+  std::shared_ptr<const MapSnapshot> made;
+  const bool done = attempt(error, Fault::kMapping, "the snapshot of the map", [&] {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    made = makeSnapshot(true);
+  });
+  map_renewed_ = Clock::now();
+  map_cost_ = map_renewed_ - begin;
+  if (!done) return;  // the next try costs as much
+  map_changed_ = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    map_ = made;
+  }
+  if (!callbacks_.on_map) return;
+  callBack(error, "the callback of the map", [&] { callbacks_.on_map(made); });
+}
+
+/// Logs a choice of options. In live operation it renews the state and logs failed refinements; in
+/// playback the caller gets these errors.
+void MapperCore::publishState(std::exception_ptr& error) {
+  SessionStatus status;
+  bool is_new_choice = false;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::uint64_t choices = session_.chosen().choices;
+    is_new_choice = std::exchange(logged_choices_, choices) != choices;
+    if (!queue_ && !is_new_choice) return;
+    status = session_.status();
+  }
+  if (is_new_choice) {
+    callBack(error, "the callback of the log", [&] {
+      if (callbacks_.info) callbacks_.info(choiceText(status));
+      if (!status.scene_unknown || !callbacks_.warn) return;
+      const Warning warning = noSceneWarning();
+      callbacks_.warn(warning.name + ": " + warning.text);
+    });
+  }
+  if (!queue_) return;
+  std::string failure;
+  if (status.refinement && status.refinement->failures > warned_failures_) {
+    warned_failures_ = status.refinement->failures;
+    failure = "refinement: " + status.refinement->last_error;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = std::move(status);
+  }
+  if (!failure.empty()) warn(failure, error);
+}
+
+SessionStatus MapperCore::status() const {
+  if (!queue_) {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    SessionStatus status = session_.status();
+    status.paused_events = paused_events_;
+    return status;
+  }
+  std::map<int, QueueCounts> cameras = queue_->counts();
+  const std::uint64_t rejected_poses = queue_->rejectedPoses();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  SessionStatus status = status_;
+  LiveStatus& live = *status.live;
+  for (const auto& [camera, counts] : live.cameras) cameras[camera].lost = counts.lost;
+  live.cameras = std::move(cameras);
+  live.rejected_poses += live_.rejected_poses + rejected_poses;
+  live.errors = live_.errors;
+  live.last_error = live_.last_error;
+  return status;
+}
+
+std::size_t MapperCore::numKeyframes() const {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return map_->keyframes.size();
+  }
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  return map_so_far_.keyframes.size();
+}
+
+std::pair<cv::Mat1f, DepthPlanesOptions> MapperCore::newestDepth() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {newest_depth_, newest_planes_};
+}
+
+void MapperCore::setSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sink_ = sink;
+}
+
+void MapperCore::setClock(ProcessorClock clock) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_ = std::move(clock);
+}
+
+/// Runs a step. Its exception goes to the caller in playback, and is counted in live operation.
+/// @param error keeps the first exception.
+template <typename Step>
+bool MapperCore::attempt(std::exception_ptr& error, Fault fault, const char* doing,
+                         const Step& step) {
+  try {
+    step();
+    return true;
+  } catch (...) {
+    if (!error) error = std::current_exception();
+    if (queue_) noteError(doing, fault);
+    return false;
+  }
+}
+
+/// Calls the host without a lock that another thread needs.
+template <typename Call>
+void MapperCore::callBack(std::exception_ptr& error, const char* name, const Call& call) {
+  if (stopped_) return;
+  if (queue_) {
+    attempt(error, Fault::kCallback, name, call);
+    return;
+  }
+  const auto thread = std::this_thread::get_id();
+  bool is_outer = false;
+  attempt(error, Fault::kCallback, name, [&] {
+    {
+      const std::lock_guard<std::mutex> lock(session_mutex_);
+      is_outer = delivering_.insert(thread).second;
+    }
+    call();
+  });
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  if (is_outer) delivering_.erase(thread);
+}
+
+/// Writes a line to the host's log.
+void MapperCore::warn(const std::string& text, std::exception_ptr& error) {
+  if (!callbacks_.warn) return;
+  callBack(error, "the callback of the log", [&] { callbacks_.warn(text); });
+}
+
+/// Counts an exception, within its handler. Throws nothing: nobody catches in the thread.
+void MapperCore::noteError(const char* doing, Fault fault) noexcept {
+  const bool is_input = fault == Fault::kEvents || fault == Fault::kPose;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_input) ++live_.errors;
+    if (fault == Fault::kPose) ++live_.rejected_poses;
+  }
+  try {
+    const std::string text = errorText();
+    bool is_new = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_new = live_.last_error != text;
+      live_.last_error = text;
+    }
+    // A failing callback is logged once, rejected events once a second, rejected poses never.
+    const Clock::time_point now = Clock::now();
+    if (fault == Fault::kCallback) is_new = logged_callbacks_.insert(doing).second;
+    if (fault == Fault::kEvents && now - rejection_logged_ < std::chrono::seconds(1)) return;
+    if (!is_new || fault == Fault::kPose) return;
+    if (is_input) rejection_logged_ = now;
+    std::exception_ptr ignored;
+    warn(is_input ? text : std::string(doing) + ": " + text, ignored);
+  } catch (...) {  // no memory: the error is counted already
+  }
+}
+
+/// Warns of lost events and dropped windows, at most once a second.
+void MapperCore::warnOfLosses() {
+  const Clock::time_point now = Clock::now();
+  if (now - warned_ < std::chrono::seconds(1)) return;
+  std::uint64_t losses = 0;
+  std::string text;
+  const SessionStatus status = this->status();
+  for (const auto& [camera, counts] : status.live->cameras) {
+    losses += counts.losses();
+    text += fmt::format("; camera {}: ", camera);
+    for (const EventFate fate :
+         {EventFate::kQueueFull, EventFate::kSubsampled, EventFate::kRejected}) {
+      text += fmt::format("{} {}, ", counts.fates[fate], rowOf(fate).text);
+    }
+    text += fmt::format("{} lost afterwards, of {} events", counts.lost, counts.received);
+  }
+  const DroppedWindows& dropped = status.counts.dropped_windows;
+  if (losses == warned_losses_ && dropped.total() == warned_dropped_windows_) return;
+  warned_ = now;
+  warned_losses_ = losses;
+  warned_dropped_windows_ = dropped.total();
+  std::exception_ptr ignored;
+  warn(fmt::format("so far {}{}", asText(dropped), text), ignored);
+}
+
+}  // namespace efm

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "event_fusion/engine.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/cloud/map_point.h"
+#include "plugin/session/input_queue.h"
+#include "plugin/session/mapping_session.h"
+#include "plugin/session/recording_statistics.h"
+#include "plugin/session/sample.h"
+
+namespace efm {
+
+/// What a Mapper has, shared with the thread of live operation: its owner may be gone before the
+/// thread ends. The functions are those of Mapper (event_fusion/engine.h).
+class MapperCore {
+ public:
+  using Callbacks = Mapper::Callbacks;
+
+  explicit MapperCore(const EventFusionOptions& options, Callbacks callbacks,
+                      const std::vector<StoredKeyframe>& earlier);
+  /// Makes a mapper whose callbacks may drop the last reference to it in live operation.
+  static std::shared_ptr<MapperCore> make(const EventFusionOptions& options, Callbacks callbacks,
+                                          const std::vector<StoredKeyframe>& earlier);
+  ~MapperCore();
+  MapperCore(const MapperCore&) = delete;
+  MapperCore& operator=(const MapperCore&) = delete;
+
+  int addCamera(const RigCamera& camera);
+  void addEvents(int camera, std::vector<Event> events);
+  void add(Sample sample);
+  void skip(const EventPacket& packet);
+  void finish();
+  void stop();
+  /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
+  bool runsHere() const { return std::this_thread::get_id() == worker_; }
+  void setSink(DsiSink* sink);
+  void setClock(ProcessorClock clock);
+
+  const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
+  SessionStatus status() const;
+  std::vector<Warning> warnings() const;
+  std::shared_ptr<const MapSnapshot> newest(bool with_points);
+  std::size_t numKeyframes() const;
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
+
+ private:
+  /// Origin of an exception: the mapping, a callback of the host, or a rejected sample.
+  enum class Fault { kMapping, kCallback, kEvents, kPose };
+  using Batch = InputQueue::Batch;
+  using Clock = std::chrono::steady_clock;
+
+  // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
+  void workHere(Batch batch);
+  void run();
+  bool runOnce();
+  void feed(Batch batch, std::exception_ptr& error);
+  bool mapNext(std::exception_ptr& error);
+  void endRun(std::exception_ptr error);
+  void keep(StoredKeyframe keyframe);
+  void forgetOldest();
+  std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
+  void publishState(std::exception_ptr& error);
+  void publishMap(bool at_once, std::exception_ptr& error);
+  std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
+  template <typename Step>
+  bool attempt(std::exception_ptr& error, Fault fault, const char* doing, const Step& step);
+  template <typename Call>
+  void callBack(std::exception_ptr& error, const char* name, const Call& call);
+  void warn(const std::string& text, std::exception_ptr& error);
+  void noteError(const char* doing, Fault fault) noexcept;
+  void warnOfLosses();
+
+  const LiveOptions options_;
+  const FusionMapperOptions mapper_options_;
+  const Callbacks callbacks_;
+  const std::shared_ptr<const RigSetup> setup_;
+  std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
+  std::atomic<bool> stopped_ = false;
+  std::mutex cameras_mutex_;               // guards the cameras that the host adds
+  std::vector<RigCamera> cameras_;         // by `addCamera`
+  bool announced_ = false;                 // the session knows them
+  mutable std::mutex poses_mutex_;         // guards poses_
+  RecordingStatistics poses_;              // of the poses alone
+  std::atomic<std::thread::id> worker_{};  // its thread in live operation
+  std::mutex join_mutex_;                  // guards thread_
+
+  // Guards the worker and the members below. It is held while a keyframe is made, and locked before
+  // mutex_. In live operation only the mapper's thread locks it.
+  mutable std::mutex session_mutex_;
+  MappingSession session_;
+  MapSnapshot map_so_far_;  // without points
+  std::map<int, std::uint64_t> paused_events_;
+  std::set<std::thread::id> delivering_;  // threads that are in a callback in playback
+  std::set<int> silent_cameras_;          // cameras without events that were logged
+  std::uint64_t logged_choices_ = 0;
+  bool finished_ = false;
+
+  // Members of the mapper's thread.
+  bool map_changed_ = false;
+  Clock::time_point map_renewed_;
+  Clock::duration map_cost_{};
+  Clock::time_point warned_;
+  Clock::time_point rejection_logged_;
+  std::set<std::string> logged_callbacks_;  // callbacks that threw and were logged
+  std::uint64_t warned_losses_ = 0;
+  std::uint64_t warned_dropped_windows_ = 0;
+  std::uint64_t warned_failures_ = 0;
+  std::shared_ptr<MapperCore> self_;  // set by `make` until the thread ends: the owner may be gone
+
+  mutable std::mutex mutex_;  // guards the members below; held for copies only
+  std::condition_variable ended_changed_;
+  DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
+  SessionStatus status_;
+  LiveStatus live_;
+  std::shared_ptr<const MapSnapshot> map_;
+  cv::Mat1f newest_depth_;
+  DepthPlanesOptions newest_planes_;
+  bool ended_ = false;
+  std::exception_ptr end_error_;
+
+  std::thread thread_;  // last member: it uses the others
+};
+
+}  // namespace efm
