@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Maps the recordings of a list. docs/many-recordings.md describes the list and the results.
+
+  recordings.py jobs  LIST OUT [OPTION...]    writes OUT/jobs, a command per recording
+  recordings.py run   OUT NAME ARGUMENT...    maps one recording to OUT/NAME
+  recordings.py table LIST OUT                prints the table; exit status 1 if a recording is not mapped
+"""
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+PROGRAM = os.environ.get("EVENT_FUSION") or "event-fusion"
+FINAL = (0, 1, 2)  # done, cannot be done, wrong options: another try would end in the same way
+TRY_AGAIN = 75  # exit status of `run` for all other statuses of the program
+COLUMNS = ("recording", "status", "keyframes", "points", "seconds", "reason")
+
+
+def fail(text):
+    print(f"error: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
+def read_json(path):
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+
+
+def write(path, text):
+    """A killed script leaves either the old file or the new file."""
+    unfinished = path.with_name(f"{path.name}.unfinished-{os.getpid()}")
+    unfinished.write_text(text, errors="surrogateescape")
+    unfinished.replace(path)
+
+
+def read_list(path):
+    """Returns {name: arguments of `event-fusion map`} in the order of the list."""
+    found = {}
+    used = dict.fromkeys(("jobs", "joblog", "lock", "log", "slurm", "table.txt"), "these scripts")
+    try:
+        lines = Path(path).read_text("utf-8-sig", "surrogateescape").split("\n")
+    except OSError as error:
+        fail(f"{path}: {error.strerror}")
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        where = f"{path}:{number}"
+        try:
+            words = shlex.split(line)
+        except ValueError as error:
+            fail(f"{where}: {error}")
+        name = words.pop(0)[:-1] if words[0].endswith(":") else None
+        if not words or not words[0] or words[0].startswith("-"):
+            fail(f"{where}: expected [NAME:] RECORDING [OPTION...]")
+        if name is None:
+            name = re.sub(r"\.[A-Za-z]\w*$", "", os.path.basename(os.path.abspath(words[0])))
+        if "/" in name or name in ("", ".", ".."):
+            fail(f"{where}: '{name}' cannot be the name of a folder: write NAME: before the recording")
+        if name in used:
+            fail(f"{where}: the name '{name}' is used by {used[name]}: write NAME: before the recording")
+        used[name] = f"line {number}"
+        found[name] = words
+    return found or fail(f"{path}: no recording")
+
+
+def jobs(list_file, out, *options):
+    recordings = read_list(list_file)
+    if not shutil.which(PROGRAM):
+        fail(f"{PROGRAM}: no such program: set EVENT_FUSION to its path")
+    (out / "log").mkdir(parents=True, exist_ok=True)
+    script = os.path.abspath(__file__)
+    text = "".join(shlex.join([script, "run", str(out), name, *arguments, *options]) + "\n"
+                   for name, arguments in recordings.items())
+    file = out / "jobs"
+    if not file.exists() or file.read_text(errors="surrogateescape") != text:
+        # GNU parallel's joblog holds numbers of lines of the old file. OUT/log tells what is finished.
+        (out / "joblog").unlink(missing_ok=True)
+        write(file, text)
+
+
+def run(out, name, *arguments):
+    status_file = out / "log" / f"{name}.status"
+    earlier = read_json(status_file)
+    tries = 1
+    if earlier and earlier["arguments"] == list(arguments):
+        if earlier["status"] in FINAL:
+            return 0
+        tries = earlier["tries"] + 1
+    status_file.unlink(missing_ok=True)
+    report = out / name / "report.json"
+    earlier_report = report.stat().st_mtime_ns if report.exists() else 0
+    # The engines send their signals to the program, too. This script stays and writes the status.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: None)
+    threads = os.environ.get("MAP_THREADS")
+    command = [PROGRAM, "map", *(["--set", f"performance.threads={threads}"] if threads else []),
+               "--out", str(out / name), *arguments]
+    with open(out / "log" / f"{name}.log", "a", errors="surrogateescape") as log:
+        print(f"=== try {tries}:", shlex.join(command), file=log, flush=True)
+        try:
+            status = subprocess.call(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        except OSError as error:
+            print(error, file=log)
+            status = 127
+    if status < 0:
+        status = 128 - status  # killed by a signal: as in a shell
+    has_report = report.exists() and report.stat().st_mtime_ns != earlier_report
+    write(status_file, json.dumps({"status": status, "tries": tries, "has_report": has_report,
+                                   "arguments": arguments}))
+    print(*(value for value in row(out, name).values() if value != "-"), flush=True)
+    return 0 if status in FINAL else TRY_AGAIN
+
+
+def reason(log):
+    """Returns the first error of the last try, or else its last line."""
+    last_try = re.split(r"(?m)^=== try .*$", log.read_text(errors="replace"))[-1].strip()
+    error = re.search(r"(?m)^event-fusion: error: (.*)", last_try)
+    return error[1] if error else last_try.split("\n")[-1] or "-"
+
+
+def row(out, name):
+    cells = dict.fromkeys(COLUMNS, "-")
+    cells["recording"] = name
+    log = out / "log" / f"{name}.log"
+    done = read_json(log.with_name(f"{name}.status"))
+    if not done:
+        cells["status"] = "unfinished" if log.exists() else "not run"
+        return cells
+    status = done["status"]
+    report = done["has_report"] and read_json(out / name / "report.json")
+    if report:
+        cells.update(keyframes=report["keyframes"], points=report["points"],
+                     seconds=f"{report['seconds']['total']:.1f}")
+    if status == 0:
+        cells["status"] = "mapped"
+        warnings = {warning["name"] for warning in report["warnings"]} if report else None
+        if warnings:
+            cells["reason"] = "warnings: " + ", ".join(sorted(warnings))
+    elif status == 130:
+        cells.update(status="stopped", reason="stopped as requested")
+    elif status > 128:
+        cells.update(status="killed", reason=f"signal {status - 128}, try {done['tries']}")
+    else:
+        cells.update(status="partial" if report else "failed", reason=reason(log))
+    return cells
+
+
+def table(list_file, out):
+    rows = [row(out, name) for name in read_list(list_file)]
+    texts = [COLUMNS] + [[str(value) for value in cells.values()] for cells in rows]
+    widths = [max(map(len, column)) for column in zip(*texts)]
+    for text in texts:
+        cells = [cell.rjust(width) if 2 <= i <= 4 else cell.ljust(width)
+                 for i, (cell, width) in enumerate(zip(text, widths))]
+        print("  ".join(cells).rstrip())
+    return 0 if all(cells["status"] == "mapped" for cells in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.stdout.reconfigure(errors="replace")
+    steps = {"jobs": jobs, "run": run, "table": table}
+    step, *arguments = sys.argv[1:] or [""]
+    if step not in steps or len(arguments) < 2 or (step == "table" and len(arguments) > 2):
+        fail(__doc__)
+    folder = 0 if step == "run" else 1
+    arguments[folder] = Path(arguments[folder])
+    sys.exit(steps[step](*arguments))
