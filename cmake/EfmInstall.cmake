@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# What `cmake --install` gives: the program, both libraries with the headers that their users need, the CMake package
+# event-fusion-mapper with the targets efm::engine and efm::mrpt, a file for pkg-config, option files and examples.
+include(CMakePackageConfigHelpers)
+
+set(EFM_INCLUDE_DIR "${CMAKE_INSTALL_INCLUDEDIR}/event-fusion-mapper")
+set(EFM_PACKAGE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/event-fusion-mapper")
+set(EFM_DATA_DIR "${CMAKE_INSTALL_DATADIR}/event-fusion-mapper")
+
+# efm_install_headers(<header>…): installs the headers and all of ours that they include, and no more.
+function(efm_install_headers)
+  set(waiting ${ARGV})
+  set(installed)
+  while(waiting)
+    list(POP_FRONT waiting header)
+    if(header IN_LIST installed)
+      continue()
+    endif()
+    list(APPEND installed "${header}")
+    set(path "${PROJECT_SOURCE_DIR}/${header}")
+    if(NOT EXISTS "${path}")
+      set(path "${PROJECT_SOURCE_DIR}/include/${header}")
+    endif()
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${path}")
+    get_filename_component(folder "${header}" DIRECTORY)
+    install(FILES "${path}" DESTINATION "${EFM_INCLUDE_DIR}/${folder}")
+    file(STRINGS "${path}" includes REGEX "^#include \"")
+    foreach(line IN LISTS includes)
+      string(REGEX REPLACE "^#include \"(.*)\".*" "\\1" included "${line}")
+      list(APPEND waiting "${included}")
+    endforeach()
+  endwhile()
+endfunction()
+
+efm_install_headers(event_fusion/engine.h plugin/mrpt/CObservationEvents.h)
+
+# The libraries that the program loads when they are needed lie beside the engine.
+set_target_properties(event-fusion PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+set_target_properties(mrpt-event-fusion event-fusion-window PROPERTIES INSTALL_RPATH "$ORIGIN")
+set_target_properties(efm_engine mrpt-event-fusion PROPERTIES
+  VERSION "${PROJECT_VERSION}"
+  SOVERSION "${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")
+set_target_properties(efm_engine PROPERTIES EXPORT_NAME engine)
+set_target_properties(mrpt-event-fusion PROPERTIES EXPORT_NAME mrpt)
+foreach(target IN ITEMS efm_engine mrpt-event-fusion)
+  target_include_directories(${target} INTERFACE "$<INSTALL_INTERFACE:${EFM_INCLUDE_DIR}>")
+endforeach()
+
+install(TARGETS event-fusion)
+install(TARGETS event-fusion-window LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+install(TARGETS efm_engine EXPORT efm-engine)
+install(TARGETS mrpt-event-fusion EXPORT efm-mrpt)
+foreach(component IN ITEMS engine mrpt)
+  install(EXPORT efm-${component} NAMESPACE efm::
+    FILE event-fusion-mapper-${component}.cmake DESTINATION "${EFM_PACKAGE_DIR}")
+endforeach()
+configure_package_config_file(cmake/event-fusion-mapper-config.cmake.in
+  "${PROJECT_BINARY_DIR}/event-fusion-mapper-config.cmake"
+  INSTALL_DESTINATION "${EFM_PACKAGE_DIR}" PATH_VARS EFM_DATA_DIR)
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/event-fusion-mapper-config-version.cmake"
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+  "${PROJECT_BINARY_DIR}/event-fusion-mapper-config.cmake"
+  "${PROJECT_BINARY_DIR}/event-fusion-mapper-config-version.cmake"
+  DESTINATION "${EFM_PACKAGE_DIR}")
+file(RELATIVE_PATH EFM_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
+configure_file(cmake/event-fusion-mapper.pc.in event-fusion-mapper.pc @ONLY)
+install(FILES "${PROJECT_BINARY_DIR}/event-fusion-mapper.pc"
+  DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+
+install(DIRECTORY config examples DESTINATION "${EFM_DATA_DIR}" USE_SOURCE_PERMISSIONS)

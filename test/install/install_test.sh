@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Installs a build, builds the examples against what was installed, in another folder, and runs them: the maps are
+# the same, bit for bit, by the program, by the engine and by MRPT's builder.
+#   install_test.sh BUILD RECORDING WORK     BUILD has the project, RECORDING a folder that `map` reads
+set -euo pipefail
+build=$(realpath "$1") recording=$(realpath "$2")
+rm -rf "$3"
+mkdir -p "$3"
+cd "$3"
+fail() { echo "$*" >&2; exit 1; }
+
+cmake --install "$build" --prefix prefix >install.log
+pc=$(find "$PWD/prefix" -name event-fusion-mapper.pc)
+libraries=$(realpath "$(dirname "$pc")/..")
+version=$(sed -n 's/^Version: //p' "$pc")
+cp -r prefix/share/event-fusion-mapper/examples .
+cmake -S examples -B build -DCMAKE_PREFIX_PATH="$PWD/prefix" -DCMAKE_BUILD_TYPE=Release >configure.log
+cmake --build build -j2 >build.log
+
+program=prefix/bin/event-fusion
+[ "$($program --version | head -n 1)" = "event-fusion $version" ] || fail "the program has another version than $version"
+$program map -q "$recording" --out out
+$program import -q "$recording" --out recording.rawlog
+build/map_recording "$recording" >/dev/null
+build/own_data "$recording" >own.log
+build/mrpt_host recording.rawlog >/dev/null
+for map in map.pcd own.pcd mrpt.pcd; do
+  cmp out/map.pcd $map || fail "$map is not the program's map"
+done
+[ "$(grep -c '^keyframe at .*[1-9][0-9]* depths$' own.log)" = "$(find out/keyframes -mindepth 1 -maxdepth 1 | wc -l)" ] ||
+  fail "own_data delivers other keyframes"
+build/live "$recording" >live.log
+grep -q '^[1-9][0-9]* keyframes, [1-9][0-9]* points in live.pcd, ' live.log || fail "live: $(tail -n 1 live.log)"
+$program map -q --config simulated_stereo --help >/dev/null || fail "the option files are not found"
+
+# Another minor version is another interface. An unknown component is named.
+request() {  # ARGUMENTS of find_package
+  mkdir -p request
+  printf 'cmake_minimum_required(VERSION 3.25)\nproject(request CXX)\nfind_package(event-fusion-mapper %s REQUIRED)\n' "$1" >request/CMakeLists.txt
+  cmake -S request -B request/build -DCMAKE_PREFIX_PATH="$PWD/prefix" >request.log 2>&1
+}
+request "${version%.*}" || fail "version ${version%.*} is not found"
+for wrong in 0.1 0.99 1.0; do
+  ! request $wrong || fail "version $version is taken for $wrong"
+done
+! request "COMPONENTS gui" || fail "component gui is found"
+grep -q 'There is no component gui' request.log || fail "$(tail -n 5 request.log)"
+
+# Without CMake.
+flags=$(PKG_CONFIG_PATH=$(dirname "$pc") pkg-config --cflags --libs event-fusion-mapper)
+# shellcheck disable=SC2086
+c++ examples/map_recording.cpp -o by_pkg_config $flags -Wl,-rpath,"$libraries" || fail "pkg-config: $flags"
+ldd by_pkg_config | grep -q "libevent-fusion.so.* => $libraries" || fail "pkg-config gives another library"
+! ldd "$libraries/libevent-fusion.so" | grep -q mrpt || fail "the engine needs MRPT"
+
+# What was installed needs neither the source tree nor the build tree.
+! grep -rl -e "$build" --include='*.cmake' --include='*.pc' --include='*.h' prefix || fail "the package has paths of the build"
+echo passed
