@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A recording in, map.pcd out: map_recording RECORDING…
+// A recording in, a folder with map.pcd out: map_recording OUT RECORDING…
 #include <event_fusion/engine.h>
 
-int main(int argc, char** argv) {
-  const auto recording = efm::openRecording({argv + 1, argv + argc});
-  efm::Mapper mapper;
-  while (auto sample = recording->next()) mapper.add(std::move(*sample));
-  mapper.finish();
-  efm::writePcd("map.pcd", *mapper.points());
+#include <iostream>
+
+int main(int argc, char** argv) try {
+  const efm::Report report = efm::mapRecording({argv + 2, argv + argc}, argv[1]);
+  for (const efm::Warning& warning : report.warnings) std::cerr << warning.text << '\n';
+  std::cout << report.points << " points in " << argv[1] << "/map.pcd\n";
+} catch (const std::exception& error) {
+  std::cerr << "error: " << error.what() << '\n';
+  return 1;
 }

@@ -1,30 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/session/map_snapshot.h"
 #include "plugin/session/sample.h"
 #include "plugin/session/session_status.h"
 
+/// @mainpage event-fusion-mapper
 /// The engine: events of calibrated cameras and poses of a tracker in, keyframe depth maps and one
 /// point cloud out. A program needs this header alone. Times are nanoseconds, lengths metres;
 /// `T_a_b` maps coordinates of frame b to frame a: p_a = T_a_b * p_b. Frames: `world`, `rig` (the
 /// tracked body), `cam` (x right, y down, z forward), `ref` (a keyframe's view, as `cam`).
 namespace efm {
 
-class DsiSink;
 class MapperCore;
 class OptionReader;
 struct EventFusionOptions;
@@ -42,6 +40,7 @@ class Options {
   /// @throws std::invalid_argument if the key is unknown, or the value is of another kind.
   void set(std::string_view key, std::string_view value);
   /// Sets the options of an .ini file; other options keep their values.
+  /// @param ini a file, or the name of an installed one: "davis346_mvsec".
   /// @throws std::runtime_error if the file cannot be read; std::invalid_argument as `set`, naming
   /// file and line.
   void read(const std::filesystem::path& ini);
@@ -74,40 +73,16 @@ std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path
 
 using Keyframe = KeyframeDepthMap;
 
-/// Points of a keyframe in its reference view, and the pose of the view. 20 bytes per point.
-/// Transformed to the world, they are again the points of the map, bit for bit.
-struct StoredKeyframe {
-  std::int64_t t_ref_ns = 0;
-  Rigid3 T_world_ref;
-  std::shared_ptr<const std::vector<ViewPoint>> points;  ///< Never null; shared, never changed.
-};
-
-/// The map at one moment.
-struct MapSnapshot {
-  /// T_world_ref of all keyframes at t_ref. The keyframes of the initial map come first.
-  std::vector<StampedPose> trajectory;
-  /// The poses of the same keyframes by the tracker. They differ if keyframes are refined.
-  std::vector<StampedPose> tracker_trajectory;
-  std::vector<StoredKeyframe> keyframes;  ///< All in playback, the newest in live operation.
-  MapCloud::ConstPtr points;              ///< The exported points.
-};
-
-/// Turns the samples of a recording or of a sensor into keyframes and one map. Thread-safe.
+/// Turns events and poses into keyframes and one map. Thread-safe; mapper_core.h has the details.
 ///
-/// In playback the caller's thread maps. `add` returns when all windows that became complete are
-/// mapped, so the same samples give the same map, bit for bit, on any number of threads. The caller
-/// gets the first error. If a window cannot be mapped (no memory, a sink that throws), the next
-/// call tries it again. If its keyframe cannot be stored, the window is dropped. A query waits
-/// while a keyframe is made, but not while it is delivered. If several threads add samples,
-/// keyframes may be delivered at the same time. Within a callback `add` and `finish` only take the
-/// input: the caller of the callback maps it. Automatic options are chosen at `finish`, or when
-/// `live.max_queue_mb` of events wait: nothing is mapped before.
+/// In playback the caller's thread maps: a call returns when all windows that became complete are
+/// mapped, or throws the first error. The same samples give the same map, bit for bit, on any
+/// number of threads. Automatic options are chosen at `finish`, or when `live.max_queue_mb` of
+/// events wait: nothing is mapped before.
 ///
-/// In live operation (`live.enabled`) a thread of the mapper maps. `add` never waits, and queries
-/// return the newest published state. If more input waits than the queue may hold, the oldest
-/// windows are dropped. Errors of the mapping, the refinement and the callbacks are counted and
-/// logged (LiveStatus); the window is dropped and the next one is tried. The snapshot of the map is
-/// renewed after each keyframe, as long as this takes at most a twentieth of the time.
+/// In live operation (`live.enabled`) a thread of the mapper maps. Adding never waits, and queries
+/// return the newest published state. If too much input waits, the oldest windows are dropped.
+/// Losses and errors are counted (LiveStatus) and logged.
 class Mapper {
  public:
   /// The callbacks run in the thread that maps, and may use the mapper. In live operation they may
@@ -148,8 +123,6 @@ class Mapper {
   /// @throws std::invalid_argument if the sample contradicts its sensor or earlier samples;
   /// std::logic_error after `finish` in playback (in live operation it is counted).
   void add(Sample sample);
-  /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
-  void skip(const EventPacket& packet);
 
   /// Ends the input, and maps the rest; in live operation it waits for the rest. In playback it may
   /// be called again after an error.
@@ -160,35 +133,43 @@ class Mapper {
   /// callback begins after that. Within a callback of live operation it does not wait: the mapper's
   /// thread ends after the callback returns.
   void stop();
-  /// Returns whether the caller is in a callback of live operation.
-  bool runsHere() const;
 
   /// Returns the map so far; in live operation its newest snapshot. Never null.
   std::shared_ptr<const MapSnapshot> snapshot() const;
   MapCloud::ConstPtr points() const { return snapshot()->points; }
   /// Returns the snapshot. In playback it has no points, because they cost an export of the map.
   std::shared_ptr<const MapSnapshot> keyframes() const;
-  std::size_t numKeyframes() const;
   std::vector<StampedPose> trajectory() const { return keyframes()->trajectory; }
   SessionStatus status() const;
   /// Returns the warnings so far: wrong or missing poses, unused data, why there is no keyframe.
   /// `mapRecording` has more: it looks at the whole recording first.
   std::vector<Warning> warnings() const;
-  /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
-  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
-  /// Returns the pose of the rig on the tracked body, from the options.
-  const std::optional<Rigid3>& T_body_rig() const;
 
-  /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
-  /// The current keyframe may still use the former sink.
-  void setSink(DsiSink* sink);
-  /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
-  /// processor time of the process.
-  void setClock(ProcessorClock clock);
+  /// Returns more for hosts in this project: mapper_core.h, which is not installed.
+  MapperCore& core() const { return *core_; }
 
  private:
   std::shared_ptr<MapperCore> core_;
 };
+
+/// What `mapRecording` made.
+struct Report {
+  std::uint64_t keyframes = 0;
+  std::uint64_t points = 0;
+  std::vector<Warning> warnings;
+  std::vector<std::string> doubts;  ///< Reasons why the map has little evidence; usually none.
+  std::string json;                 ///< The content of report.json: counts, times, options, …
+};
+
+/// Maps a recording into a folder, as `event-fusion map` does: options that are chosen from the
+/// data are chosen from the whole recording first. The folder gets map.pcd, map.html, keyframes/,
+/// trajectory.txt, report.json and pictures; an earlier result there is replaced.
+/// @param files, overrides see `openRecording`.
+/// @throws std::exception if the recording cannot be read to its end, or a file cannot be written.
+/// The data before the damage are mapped and written all the same.
+Report mapRecording(const std::vector<std::filesystem::path>& files,
+                    const std::filesystem::path& out, const Options& options = {},
+                    const Overrides& overrides = {});
 
 /// Writes a binary PCD file with the fields of MapPoint. The file appears when it is complete.
 /// @throws std::runtime_error naming the file.

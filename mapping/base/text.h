@@ -23,7 +23,7 @@ struct Warning {
 /// Functions that make text of a file safe for error messages: one line, no control characters.
 
 /// Returns the first `max_characters`, followed by "…" if the text is longer. Characters other than
-/// printable ASCII become \xNN.
+/// printable ASCII become `\\xNN`.
 std::string printable(std::string_view text, std::size_t max_characters = 40);
 
 /// Returns `printable(text)` between single quotes.

@@ -11,7 +11,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/commands.h"
-#include "plugin/app/output_checks.h"
+#include "plugin/options/option_file.h"
 #include "plugin/options/tracker_fault_keys.h"
 #include "plugin/recordings/streams/time_unit.h"
 

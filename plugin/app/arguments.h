@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "tracking_stub/faults/tracker_faults.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"

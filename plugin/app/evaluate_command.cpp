@@ -9,7 +9,7 @@
 
 #include "plugin/app/arguments.h"
 #include "plugin/app/commands.h"
-#include "plugin/app/output_checks.h"
+#include "plugin/playback/output_checks.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"

@@ -12,8 +12,8 @@
 
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
-#include "plugin/app/output_checks.h"
-#include "plugin/app/progress.h"
+#include "plugin/playback/output_checks.h"
+#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"

@@ -18,7 +18,7 @@
 #include "mapping/sweep/space_sweep.h"
 #include "plugin/app/commands.h"
 #include "plugin/app/program.h"
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"

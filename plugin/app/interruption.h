@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <stdexcept>
+#include "plugin/playback/error_text.h"
 
 namespace efm {
 
@@ -19,12 +19,6 @@ class Interruption {
   bool requested() const;
   /// @throws Interrupted if a signal came.
   void check() const;
-};
-
-/// Error of a command that was interrupted and has no result.
-class Interrupted : public std::runtime_error {
- public:
-  Interrupted() : std::runtime_error("stopped by a signal: there is no result") {}
 };
 
 }  // namespace efm

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <exception>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
-#include "mapping/base/option.h"
+#include "plugin/playback/error_text.h"
 
 namespace efm {
 
@@ -34,24 +31,6 @@ auto asUsage(const Step& step) {
 
 /// Prints an error to stderr, "event-fusion: error: …". @return the status.
 int fail(const std::string& message, int status = kFailedStatus);
-
-/// Error as text for the user, and the options that it concerns.
-struct UserError {
-  std::string text;
-  std::vector<OptionId> options{};     ///< Options that the text names.
-  std::optional<OptionError> wrong{};  ///< Option whose value is out of range.
-  std::string more{};                  ///< End of the text, after the error itself.
-
-  void add(const std::string& end) {
-    text += end;
-    more += end;
-  }
-};
-UserError userError(const std::exception& error);
-
-/// Returns the text of the error only: one sentence, without the additions of libraries for
-/// programmers (call stacks, places in sources, names of types).
-std::string userMessage(const std::exception& error);
 
 /// Runs the program `event-fusion` with a command line. Prints every error to stderr.
 /// @return the exit status: 0 only if the command has done its job and stdout took its output.

@@ -71,16 +71,6 @@ std::optional<std::string> readAll(Recording& recording, const std::function<voi
   }
 }
 
-std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts) {
-  std::string nearest;
-  for (const auto& t_ns : {counts.nearest_before_ns, counts.nearest_after_ns}) {
-    if (t_ns) nearest += (nearest.empty() ? "" : " and ") + formatSeconds(*t_ns) + " s";
-  }
-  return fmt::format("no event {}: {}", limitsText(limits),
-                     nearest.empty() ? "event-fusion info tells the recording's times"
-                                     : "the nearest events lie at " + nearest);
-}
-
 void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
   if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
   throw std::runtime_error(noEventText(limits, recording.counts()));

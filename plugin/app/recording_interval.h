@@ -56,9 +56,6 @@ class RecordingTimes {
 /// @return the error of the recording; std::nullopt if the recording was read to its end.
 std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take);
 
-/// Returns the error of an interval without events: it names the times of the nearest events.
-std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts);
-
 /// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
 /// @param recording was read, and had no event.
 void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);

@@ -15,7 +15,7 @@
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/program.h"
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "tracking_stub/presets/presets.h"
 #include "tracking_stub/sensor/simulated_rig.h"

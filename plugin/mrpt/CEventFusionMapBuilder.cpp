@@ -18,6 +18,7 @@
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
+#include "plugin/session/mapper_core.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
@@ -65,7 +66,7 @@ std::shared_ptr<Mapper> CEventFusionMapBuilder::mapper() const {
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
   // Checked before the lock: the thread that holds it may wait for the end of this callback.
-  if (const auto current = mapper(); current && current->runsHere()) {
+  if (const auto current = mapper(); current && current->core().runsHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
@@ -80,7 +81,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   if (const auto former = mapper()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
-  mapper_->setSink(sink_);
+  mapper_->core().setSink(sink_);
   tracker_poses_ = {};
   options_ = builder_options;
   ignored_observations_ = 0;
@@ -125,7 +126,7 @@ std::function<void(const Argument&)> CEventFusionMapBuilder::hosts(
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
-  mapper_->setSink(sink);
+  mapper_->core().setSink(sink);
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
@@ -136,13 +137,13 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     if (options.enableMapUpdating) {  // MRPT's option of every map builder
       mapper()->add(std::move(packet));
     } else {
-      mapper()->skip(packet);
+      mapper()->core().skip(packet);
     }
   } else if (const auto pose = poseIn(*observation)) {
     const auto mapper = this->mapper();
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      tracker_poses_.add(*observation, *pose, rigPose(*pose, mapper->T_body_rig()));
+      tracker_poses_.add(*observation, *pose, rigPose(*pose, mapper->core().T_body_rig()));
     }
     mapper->add(*pose);
   } else if (isFinish(*observation)) {
@@ -255,7 +256,7 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  return static_cast<unsigned int>(mapper()->numKeyframes());
+  return static_cast<unsigned int>(mapper()->core().numKeyframes());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
@@ -291,7 +292,7 @@ void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  const auto [depth, planes] = mapper()->newestDepth();
+  const auto [depth, planes] = mapper()->core().newestDepth();
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {

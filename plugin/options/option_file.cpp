@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/options/option_file.h"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +16,23 @@
 
 namespace efm {
 namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSuffix = ".ini";
+
+/// Returns the folder of the option files: installed, or in the project; empty if there is none.
+fs::path configFolder() {
+  Dl_info own{};
+  std::error_code error;
+  if (dladdr(reinterpret_cast<void*>(&configFolder), &own) != 0) {
+    const fs::path library = fs::weakly_canonical(own.dli_fname, error);
+    const fs::path installed = library.parent_path() / EFM_DATA_FROM_LIBRARY / "config";
+    if (fs::is_directory(installed, error)) return installed;
+  }
+  const fs::path source = EFM_CONFIG_DIR;
+  return fs::is_directory(source, error) ? source : fs::path();
+}
 
 /// Returns the origin of an option: "rig.ini:3: [dsi]".
 std::string originOf(std::string_view line, std::string_view section) {
@@ -226,6 +244,33 @@ std::string OptionReader::given(std::string_view section, std::string_view key) 
   return found == given_.end() ? std::string() : found->second.text;
 }
 
+std::vector<std::string> configNames() {
+  std::vector<std::string> names;
+  const fs::path folder = configFolder();
+  if (folder.empty()) return names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == kSuffix) names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path findConfig(const std::string& name_or_path, const std::string& given_as) {
+  std::error_code ignored;
+  const fs::path path = name_or_path;
+  if (fs::is_regular_file(path, ignored)) return path;
+  if (path.extension() == kSuffix) {
+    if (fs::exists(path, ignored)) return path;  // reading reports the error
+    reject("{}: no such option file", name_or_path);
+  }
+  const std::vector<std::string> names = configNames();
+  if (std::binary_search(names.begin(), names.end(), name_or_path)) {
+    return configFolder() / (name_or_path + kSuffix);
+  }
+  reject("{}{}: no such option file: {}", given_as, inQuotes(name_or_path),
+         expectedName(name_or_path, names));
+}
+
 Options::Options() : reader_(std::make_shared<OptionReader>()) {}
 
 Options::Options(const EventFusionOptions& values)
@@ -250,7 +295,7 @@ void Options::set(std::string_view key, std::string_view value) {
 }
 
 void Options::read(const std::filesystem::path& ini) {
-  change([&](OptionReader& reader) { reader.readFile(ini); });
+  change([&](OptionReader& reader) { reader.readFile(findConfig(ini.string())); });
 }
 
 EventFusionOptions Options::values() const {

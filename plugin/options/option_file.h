@@ -75,4 +75,14 @@ class OptionReader {
   int assignments_ = 0;
 };
 
+/// Returns the names of the option files without ".ini", sorted: "default", "dsec", … They lie
+/// where `cmake --install` puts them, or in the project's config/.
+std::vector<std::string> configNames();
+
+/// Returns the option file of a name. A path is returned unchanged.
+/// @param given_as begin of the error's text: "--config ".
+/// @throws std::invalid_argument if there is no such file, or, with the known names, if the name is
+/// unknown.
+std::filesystem::path findConfig(const std::string& name_or_path, const std::string& given_as = {});
+
 }  // namespace efm

@@ -129,6 +129,9 @@ Warning noSceneWarning();
 /// and events at different times (by how much), noise alone, or too little of both for one window.
 OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
 
+/// Returns the error of an interval without events: it names the times of the nearest events.
+std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts);
+
 /// Returns the warning about wrong poses, with the option or file that fixes them.
 /// @param rig with which the mistake was found.
 Warning poseWarning(const PoseFinding& finding, const Rig& rig);

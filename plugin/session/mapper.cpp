@@ -23,21 +23,12 @@ void Mapper::addPose(const StampedPose& pose, const std::optional<PoseNoise>& no
   core_->add(std::move(sample));
 }
 void Mapper::add(Sample sample) { core_->add(std::move(sample)); }
-void Mapper::skip(const EventPacket& packet) { core_->skip(packet); }
 void Mapper::finish() { core_->finish(); }
 void Mapper::stop() { core_->stop(); }
-bool Mapper::runsHere() const { return core_->runsHere(); }
 
 std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return core_->newest(true); }
 std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return core_->newest(false); }
-std::size_t Mapper::numKeyframes() const { return core_->numKeyframes(); }
 SessionStatus Mapper::status() const { return core_->status(); }
 std::vector<Warning> Mapper::warnings() const { return core_->warnings(); }
-std::pair<cv::Mat1f, DepthPlanesOptions> Mapper::newestDepth() const {
-  return core_->newestDepth();
-}
-const std::optional<Rigid3>& Mapper::T_body_rig() const { return core_->T_body_rig(); }
-void Mapper::setSink(DsiSink* sink) { core_->setSink(sink); }
-void Mapper::setClock(ProcessorClock clock) { core_->setClock(std::move(clock)); }
 
 }  // namespace efm

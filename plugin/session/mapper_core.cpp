@@ -105,6 +105,11 @@ void MapperCore::addEvents(int camera, std::vector<Event> events) {
 
 std::vector<Warning> MapperCore::warnings() const {
   const SessionStatus state = status();
+  bool ended = false;
+  {
+    const std::lock_guard<std::mutex> lock(queue_ ? mutex_ : session_mutex_);
+    ended = queue_ ? ended_ : finished_;
+  }
   const std::lock_guard<std::mutex> lock(poses_mutex_);
   Findings findings{poses_, {}};
   findings.use(mapper_options_.keyframe.planes, state.chosen);
@@ -112,7 +117,7 @@ std::vector<Warning> MapperCore::warnings() const {
   findings.session = &state;
   findings.options = &mapper_options_;
   std::vector<Warning> warnings = warningsOf(findings);
-  if (state.events && state.poses && state.counts.keyframes == 0) {
+  if (ended && state.counts.keyframes == 0) {
     addWarning(warnings, "no-keyframe", "there is no keyframe: {}",
                whyNoKeyframe(state, mapper_options_).what());
   }

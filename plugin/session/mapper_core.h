@@ -30,7 +30,17 @@
 namespace efm {
 
 /// What a Mapper has, shared with the thread of live operation: its owner may be gone before the
-/// thread ends. The functions are those of Mapper (event_fusion/engine.h).
+/// thread ends. Functions without a comment are those of Mapper.
+///
+/// In playback, if a window cannot be mapped (no memory, a sink that throws), the next call tries
+/// it again. If its keyframe cannot be stored, the window is dropped. A query waits while a
+/// keyframe is made, but not while it is delivered. If several threads add samples, keyframes may
+/// be delivered at the same time. Within a callback `add` and `finish` only take the input: the
+/// caller of the callback maps it.
+///
+/// In live operation errors of the mapping, the refinement and the callbacks are counted and
+/// logged; the window is dropped and the next one is tried. The snapshot of the map is renewed
+/// after each keyframe, as long as this takes at most a twentieth of the time.
 class MapperCore {
  public:
   using Callbacks = Mapper::Callbacks;
@@ -47,19 +57,26 @@ class MapperCore {
   int addCamera(const RigCamera& camera);
   void addEvents(int camera, std::vector<Event> events);
   void add(Sample sample);
+  /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
   void skip(const EventPacket& packet);
   void finish();
   void stop();
   /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
   bool runsHere() const { return std::this_thread::get_id() == worker_; }
+  /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
+  /// The current keyframe may still use the former sink.
   void setSink(DsiSink* sink);
+  /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
+  /// processor time of the process.
   void setClock(ProcessorClock clock);
 
+  /// Returns the pose of the rig on the tracked body, from the options.
   const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
   SessionStatus status() const;
   std::vector<Warning> warnings() const;
   std::shared_ptr<const MapSnapshot> newest(bool with_points);
   std::size_t numKeyframes() const;
+  /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
 
  private:

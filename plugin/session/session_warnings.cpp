@@ -223,6 +223,16 @@ OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions&
                      fullWindow(options.policy), spans, formatSeconds(last_ns - first_ns));
 }
 
+std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts) {
+  std::string nearest;
+  for (const auto& t_ns : {counts.nearest_before_ns, counts.nearest_after_ns}) {
+    if (t_ns) nearest += (nearest.empty() ? "" : " and ") + formatSeconds(*t_ns) + " s";
+  }
+  return fmt::format("no event {}: {}", limitsText(limits),
+                     nearest.empty() ? "event-fusion info tells the recording's times"
+                                     : "the nearest events lie at " + nearest);
+}
+
 void checkSession(const Findings& findings, Warnings& warnings) {
   if (!findings.session) return;
   const SessionStatus& status = *findings.session;

@@ -22,10 +22,10 @@ program=prefix/bin/event-fusion
 [ "$($program --version | head -n 1)" = "event-fusion $version" ] || fail "the program has another version than $version"
 $program map -q "$recording" --out out
 $program import -q "$recording" --out recording.rawlog
-build/map_recording "$recording" >/dev/null
+build/map_recording example_out "$recording" >/dev/null
 build/own_data "$recording" >own.log
 build/mrpt_host recording.rawlog >/dev/null
-for map in map.pcd own.pcd mrpt.pcd; do
+for map in example_out/map.pcd own.pcd mrpt.pcd; do
   cmp out/map.pcd $map || fail "$map is not the program's map"
 done
 [ "$(grep -c '^keyframe at .*[1-9][0-9]* depths$' own.log)" = "$(find out/keyframes -mindepth 1 -maxdepth 1 | wc -l)" ] ||

@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <set>
 
+#include "event_fusion/engine.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
 
@@ -107,6 +111,37 @@ TEST_F(MapCommand, NamesThatAreNotUtf8CostNoResult) {
       run("evaluate trajectory 'o\xe9/trajectory.txt' 'd\xe9/poses.txt' --align none --json");
   EXPECT_EQ(evaluation.status, 0) << evaluation.err;
   EXPECT_EQ(json::parse(evaluation.out)["truth_file"], "d" + unknown + "/poses.txt");
+}
+
+TEST_F(MapCommand, MapRecordingMakesTheSameFilesAndReportsTheSameErrors) {
+  write(SyntheticRecording());
+  const auto files = [&](const std::string& name) {
+    std::set<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(folder() / name)) {
+      names.insert(fs::relative(entry.path(), folder() / name).string());
+    }
+    return names;
+  };
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  Options options;
+  options.read(folder() / "rig.ini");
+  const Report report = mapRecording({folder() / "data"}, folder() / "by_engine", options);
+  EXPECT_EQ(files("by_engine"), files("out"));
+  for (const char* name : {"map.pcd", "trajectory.txt"}) {
+    EXPECT_EQ(contentOf(std::string("by_engine/") + name), contentOf(std::string("out/") + name));
+  }
+  EXPECT_EQ(report.keyframes, reportIn("out")["keyframes"]);
+  EXPECT_EQ(report.points, reportIn("out")["points"]);
+  EXPECT_EQ(json::parse(report.json)["options"], reportIn("out")["options"]);
+
+  // Damage: what comes before it is mapped, then the error is thrown.
+  std::ofstream(folder() / "data/cam0/events.txt", std::ios::app) << "damage\n";
+  const Result damaged = run("map rig.ini data --out out");
+  const std::string error =
+      messageOf([&] { mapRecording({folder() / "data"}, folder() / "by_engine", options); });
+  EXPECT_THAT(error, HasSubstr("events.txt"));
+  EXPECT_THAT(damaged.err, HasSubstr(error.substr(error.find("events.txt"))));
+  EXPECT_EQ(contentOf("by_engine/map.pcd"), contentOf("out/map.pcd"));
 }
 
 }  // namespace

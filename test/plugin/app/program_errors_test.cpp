@@ -13,7 +13,7 @@
 #include <system_error>
 
 #include "plugin/app/program.h"
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {

@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "event_fusion/engine.h"
 #include "mapping/geometry/rigid3.h"
 #include "plugin/options/option_keys.h"
 #include "test/paths.h"
@@ -401,6 +402,42 @@ TEST(ConfigFolder, EveryFileIsRead) {
     ++files;
   }
   EXPECT_GE(files, 6);
+}
+
+TEST(Options, ErrorsNameTheKeyTheValueAndTheRange) {
+  const struct {
+    const char* key;
+    const char* value;
+    const char* error;
+  } kCases[] = {
+      {"num_planes", "4", "option 'num_planes': expected section.key"},
+      {"dsi.planes", "4", "options: [dsi] planes: unknown key: expected"},
+      {"dis.num_planes", "4", "options: [dis] unknown section: did you mean [dsi]?"},
+      {"dsi.num_planes", "many", "options: [dsi] num_planes = many: must be a whole number"},
+      {"dsi.num_planes", "0", "options: [dsi] num_planes = 0: must be 1 to 100000"},
+  };
+  for (const auto& wrong : kCases) {
+    EXPECT_THAT(messageOf([&] {
+                  Options options;
+                  options.set(wrong.key, wrong.value);
+                  options.values();
+                }),
+                StartsWith(wrong.error));
+  }
+}
+
+TEST(Options, ANameIsAnInstalledFileAndACopyIsIndependent) {
+  Options options;
+  options.read("davis346_mvsec");
+  OptionReader reader;
+  reader.readFile(kConfigFolder / "davis346_mvsec.ini");
+  EXPECT_EQ(listed(options.values()), listed(reader.options()));
+  const Options copy = options;
+  options.set("dsi.num_planes", "7");
+  EXPECT_EQ(options.values().mapper.keyframe.planes.num_planes, 7);
+  EXPECT_EQ(listed(copy.values()), listed(reader.options()));
+  EXPECT_THAT(messageOf([&] { options.read("davis346"); }),
+              StartsWith("'davis346': no such option file: expected"));
 }
 
 }  // namespace

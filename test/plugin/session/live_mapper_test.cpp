@@ -43,7 +43,7 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
   ASSERT_EQ(map->trajectory.size(), 11U);
   expectSameMap(*map, *expected);
   ASSERT_EQ(map->keyframes.size(), 4U);
-  EXPECT_EQ(mapper.numKeyframes(), 4U);
+  EXPECT_EQ(mapper.core().numKeyframes(), 4U);
   for (std::size_t i = 0; i < 4; ++i) {
     const StoredKeyframe& keyframe = map->keyframes[i];
     const StoredKeyframe& other = expected->keyframes[7 + i];
@@ -51,7 +51,7 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
     EXPECT_TRUE(isSame(keyframe.T_world_ref, other.T_world_ref));
     EXPECT_EQ(keyframe.points->size(), other.points->size());
   }
-  EXPECT_EQ(cv::norm(mapper.newestDepth().first, playback.newestDepth().first), 0);
+  EXPECT_EQ(cv::norm(mapper.core().newestDepth().first, playback.core().newestDepth().first), 0);
   const SessionStatus status = mapper.status();
   expectSumsAgree(status);
   EXPECT_EQ(status.live->dropRatio(), 0);
@@ -146,7 +146,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   }
   ASSERT_LT(i, samples.size());
   for (; i < samples.size(); ++i) mapper.add(samples[i]);  // while the mapping is blocked
-  EXPECT_GE(mapper.numKeyframes(), 1U);
+  EXPECT_GE(mapper.core().numKeyframes(), 1U);
   EXPECT_FALSE(mapper.points()->empty());
   const SessionStatus before = mapper.status();
   EXPECT_LE(before.live->cameras.at(0).queued + before.live->cameras.at(1).queued, 2500U);
@@ -356,7 +356,7 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
     for (int times = fault == kTwice ? 2 : fault == kLost ? 0 : 1; times > 0; --times) {
       if (packet != nullptr) fed[packet->camera] += packet->events.size();
       if (packet != nullptr && fault == kPaused) {
-        mapper.skip(*packet);
+        mapper.core().skip(*packet);
       } else {
         messageOf([&] { mapper.add(sample); });
       }

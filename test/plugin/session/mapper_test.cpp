@@ -98,6 +98,79 @@ TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsis
   EXPECT_GT(moved, count / 2);
 }
 
+// --- Own data ----------------------------------------------------------------------------------
+
+/// Adds poses and events in the order of time, each camera's events of 10 ms at once.
+void addInOrder(Mapper& mapper, const SyntheticRecording& recording) {
+  for (const Sample& sample : samplesOf(recording)) {
+    if (const auto* packet = std::get_if<EventPacket>(&sample)) {
+      mapper.addEvents(packet->camera, packet->events);
+    } else {
+      const PoseSample& pose = std::get<PoseSample>(sample);
+      mapper.addPose({pose.t_ns, pose.T_world_body});
+    }
+  }
+}
+
+TEST_P(MapperInEitherMode, OwnDataMakeTheMapOfARecording) {
+  const SyntheticRecording recording(0.8);
+  const auto expected = mapOf(syntheticOptions(), samplesOf(recording));
+  Mapper mapper(in(syntheticOptions()));
+  for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+  addInOrder(mapper, recording);
+  if (!isLive()) {
+    EXPECT_GT(mapper.trajectory().size(), 1U) << "it waits for no further camera";
+  }
+  mapper.finish();
+  expectSameMap(*mapper.snapshot(), *expected);
+  EXPECT_THROW(mapper.addCamera(recording.cameras[0]), std::logic_error);
+  EXPECT_THROW(mapper.addEvents(2, {}), std::invalid_argument);
+  EXPECT_TRUE(mapper.warnings().empty()) << mapper.warnings()[0].text;
+}
+
+TEST(Mapper, OwnDataMayComeInAnyOrderOfSensors) {
+  const SyntheticRecording recording(0.8);
+  for (const bool is_chosen : {false, true}) {
+    EventFusionOptions options = syntheticOptions();
+    if (is_chosen) options.automatic = defaultOptions().automatic;
+    const auto expected = mapOf(options, samplesOf(recording));
+    for (const bool poses_first : {false, true}) {
+      Mapper mapper(options);
+      for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+      const auto add_poses = [&] {
+        for (const StampedPose& pose : recording.poses) mapper.addPose(pose);
+      };
+      if (poses_first) add_poses();
+      mapper.addEvents(1, recording.events[1]);
+      mapper.addEvents(0, recording.events[0]);
+      if (!poses_first) add_poses();
+      mapper.finish();
+      expectSameMap(*mapper.snapshot(), *expected);
+    }
+  }
+}
+
+TEST_P(MapperInEitherMode, WarningsSayWhyThereIsNoKeyframe) {
+  const SyntheticRecording recording;
+  const auto last_warning = [&](bool has_events, bool has_poses) {
+    EventFusionOptions options = in(syntheticOptions());
+    options.mapper.policy.window_s = 2;
+    Mapper mapper(options);
+    EXPECT_TRUE(mapper.warnings().empty()) << "more data may come";
+    for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+    for (const StampedPose& pose : recording.poses) {
+      if (has_poses) mapper.addPose(pose);
+    }
+    for (int c = 0; has_events && c < 2; ++c) mapper.addEvents(c, recording.events[std::size_t(c)]);
+    mapper.finish();
+    return mapper.warnings().back();
+  };
+  EXPECT_EQ(last_warning(false, true).name, "no-keyframe");
+  EXPECT_THAT(last_warning(false, true).text, HasSubstr("no events"));
+  EXPECT_THAT(last_warning(true, false).text, HasSubstr("no poses"));
+  EXPECT_THAT(last_warning(true, true).text, HasSubstr("no window of 2.000000000 s"));
+}
+
 // --- Pause and end -----------------------------------------------------------------------------
 
 /// Holds if the mapping keeps up, and if it gets most of the input at once.
@@ -115,7 +188,7 @@ TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
       fed += numEvents(samples[i]);
       const auto* const packet = std::get_if<EventPacket>(&samples[i]);
       if (packet != nullptr && i >= 450 && i < 750) {
-        mapper.skip(*packet);
+        mapper.core().skip(*packet);
       } else if (at_once) {
         mapper.add(samples[i]);
       } else {
@@ -177,7 +250,7 @@ TEST_P(MapperInEitherMode, FinishThrowsTheErrorOfTheRig) {
     if (packet == nullptr || packet->camera == 1) mapper.add(sample);
   }
   EXPECT_THROW(mapper.finish(), std::invalid_argument) << "there is no camera 0";
-  EXPECT_EQ(mapper.numKeyframes(), 0U);
+  EXPECT_EQ(mapper.core().numKeyframes(), 0U);
 }
 
 TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
@@ -186,7 +259,7 @@ TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
   Mapper::Callbacks callbacks;
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
     ++calls;
-    EXPECT_EQ(mapper->runsHere(), isLive());
+    EXPECT_EQ(mapper->core().runsHere(), isLive());
     if (isLive()) {
       EXPECT_THROW(mapper->finish(), std::logic_error) << "it would wait for itself";
     }
@@ -224,7 +297,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
     };
     callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
       EXPECT_EQ(madeKeyframes(), ++keyframes) << "the next one is made later";
-      EXPECT_TRUE(isLive() || mapper->numKeyframes() == keyframes);
+      EXPECT_TRUE(isLive() || mapper->core().numKeyframes() == keyframes);
       ++thrown;
       throw std::runtime_error("keyframe " + std::to_string(keyframes));
     };
@@ -267,7 +340,7 @@ TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
   Mapper::Callbacks callbacks;
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) { ++delivered; };
   Mapper mapper(in(syntheticOptions()), callbacks);
-  mapper.setSink(&disk);
+  mapper.core().setSink(&disk);
   const std::size_t errors = addAll<std::runtime_error>(mapper, samples);
   if (!isLive()) {
     EXPECT_GT(errors, 10U) << "each sample tries the window again";
@@ -278,7 +351,7 @@ TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
     EXPECT_THROW(mapper.add(EventPacket{0, recording.cameras[0], {{t_ns, 120, 0, true}}, {}}),
                  std::invalid_argument)
         << "of two errors the first";
-    mapper.setSink(nullptr);
+    mapper.core().setSink(nullptr);
   }
   mapper.finish();
   const auto expected = mapOf(syntheticOptions(), samples);
@@ -314,7 +387,7 @@ TEST_P(MapperInEitherMode, IfMemoryEndsKeyframesAndPointsStayConsistent) {
       if (sink.keyframes == 2) allocations = stopFailing();
     };
     Mapper mapper(options, callbacks);
-    mapper.setSink(&sink);
+    mapper.core().setSink(&sink);
     std::size_t errors = addAll<std::bad_alloc>(mapper, samples);
     mapper.finish();
     stopFailing();
@@ -361,10 +434,10 @@ TEST_P(MapperInEitherMode, QueriesAreAnsweredDuringASweepInLiveOperationAlone) {
   QueryingSink sink;
   Mapper mapper(in(syntheticOptions()));
   sink.queries = {[&] { mapper.status(); }, [&] { mapper.points(); }, [&] { mapper.keyframes(); },
-                  [&] { mapper.numKeyframes(); }};
-  if (isLive()) sink.queries.emplace_back([&] { mapper.skip({}); });
+                  [&] { mapper.core().numKeyframes(); }};
+  if (isLive()) sink.queries.emplace_back([&] { mapper.core().skip({}); });
   if (isLive()) sink.patience = std::chrono::seconds(60);
-  mapper.setSink(&sink);
+  mapper.core().setSink(&sink);
   play(mapper, samplesOf(SyntheticRecording()));
   sink.answers.clear();  // waits for the query threads
   EXPECT_EQ(sink.answered, isLive() ? sink.queries.size() : 0U);
@@ -421,7 +494,7 @@ TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
       while (!done) {
         expectConsistent(*mapper.snapshot(), options.cloud);
         mapper.status();
-        mapper.newestDepth();
+        mapper.core().newestDepth();
       }
     });
     for (std::thread& feeder : feeders) feeder.join();
@@ -429,7 +502,7 @@ TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
     done = true;
     querier.join();
     EXPECT_EQ(delivered, 8U);
-    EXPECT_EQ(mapper.numKeyframes(), delivered);
+    EXPECT_EQ(mapper.core().numKeyframes(), delivered);
     expectSameMap(*mapper.snapshot(), *expected);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/mapping_run.h"
+#include "plugin/playback/mapping_run.h"
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/app/recording_interval.h"
 
 namespace efm {
 

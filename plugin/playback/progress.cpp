@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/progress.h"
+#include "plugin/playback/progress.h"
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "event_fusion/engine.h"
-#include "plugin/app/program.h"
-#include "plugin/app/progress.h"
+#include "plugin/playback/error_text.h"
+#include "plugin/playback/progress.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/map_watcher.h"
 #include "plugin/session/recording_statistics.h"

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/playback/error_text.h"
+#include "plugin/playback/mapping_run.h"
+#include "plugin/playback/progress.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "plugin/results/output/map_output.h"
+#include "plugin/results/output/report.h"
+#include "plugin/session/event_fusion_options.h"
+
+namespace efm {
+
+/// A recording to map into a folder.
+struct MapJob {
+  /// The recording. The options' calibration and hand-eye transform replace its own.
+  RecordingSource source;
+  EventFusionOptions options;   ///< See `prepare`.
+  std::filesystem::path out;    ///< The folder of the result.
+  bool force = false;           ///< Allow a folder that holds other files.
+  bool plain_pictures = false;  ///< No enlargement or colour bar in depth.png and confidence.png.
+  bool save_dsi = false;        ///< `mapWindowInto`: write the whole DSI.
+  /// Further files that are read: the result must not replace them.
+  std::vector<std::filesystem::path> inputs;
+  Verbosity verbosity = Verbosity::kQuiet;
+
+  // Callbacks in the caller's thread; each may be empty.
+  std::function<bool()> stop;  ///< Returns whether the job is to end as soon as possible.
+  std::function<void(const std::vector<Warning>&)> warn;  ///< Receives each warning once.
+  std::function<void(const std::string&)> note;
+  std::function<void(const KeyframeDepthMap&, const MappingRun&)> on_keyframe;
+  std::function<void(const MappingRun&)> on_last_keyframe;  ///< After the last keyframe.
+
+  /// Returns the recording for the options so far: the stride may be chosen later. It is the length
+  /// of tracker noise that is constant over a keyframe.
+  RecordingSource sourceNow() const;
+  /// Takes the overrides of the source into the options, and reads calibration and hand-eye
+  /// transform once.
+  void prepare();
+};
+
+/// The result of a job in its folder.
+struct MapResult {
+  MapReport report;
+  /// Why the recording was not mapped to its end, or a file of the result could not be written.
+  std::optional<UserError> error;
+  bool kept_earlier = false;  ///< There is no new result: the folder's earlier result stays.
+
+  /// Returns whether there are keyframes, but no point.
+  bool isWithoutPoints() const { return report.counts.keyframes > 0 && report.points == 0; }
+};
+
+/// Maps a recording: all that `event-fusion map` writes. If `stop` returns true during the mapping,
+/// the result is that of the recording so far.
+/// @throws Interrupted if `stop` returned true before the mapping; OptionError if an option is out
+/// of range; std::exception if the options or the recording cannot be read, or a keyframe cannot be
+/// written.
+MapResult mapInto(MapJob job);
+
+/// Maps the window `options.mapper.only_window`: all that `event-fusion depth` writes.
+/// @throws as `mapInto`; Interrupted until the keyframe is made.
+MapResult mapWindowInto(MapJob job);
+
+}  // namespace efm
