@@ -22,6 +22,7 @@ function(efm_install_headers)
       set(path "${PROJECT_SOURCE_DIR}/include/${header}")
     endif()
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${path}")
+    set_property(GLOBAL APPEND PROPERTY EFM_PUBLIC_HEADERS "${path}")
     get_filename_component(folder "${header}" DIRECTORY)
     install(FILES "${path}" DESTINATION "${EFM_INCLUDE_DIR}/${folder}")
     file(STRINGS "${path}" includes REGEX "^#include \"")
@@ -69,3 +70,24 @@ install(FILES "${PROJECT_BINARY_DIR}/event-fusion-mapper.pc"
   DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
 install(DIRECTORY config examples DESTINATION "${EFM_DATA_DIR}" USE_SOURCE_PERMISSIONS)
+
+# The reference of the public headers: cmake --build … --target docs writes docs/html in the build folder.
+find_package(Doxygen QUIET)
+if(DOXYGEN_FOUND)
+  get_property(headers GLOBAL PROPERTY EFM_PUBLIC_HEADERS)
+  list(REMOVE_DUPLICATES headers)
+  set(DOXYGEN_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/docs")
+  set(DOXYGEN_STRIP_FROM_PATH "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/include")
+  set(DOXYGEN_STRIP_FROM_INC_PATH ${DOXYGEN_STRIP_FROM_PATH})
+  set(DOXYGEN_JAVADOC_AUTOBRIEF YES)
+  set(DOXYGEN_EXTRACT_ALL YES)
+  set(DOXYGEN_WARN_IF_INCOMPLETE_DOC NO)  # a parameter whose name says all has no line
+  set(DOXYGEN_WARN_AS_ERROR FAIL_ON_WARNINGS)
+  set(DOXYGEN_MACRO_EXPANSION YES)
+  set(DOXYGEN_EXPAND_ONLY_PREDEF YES)
+  set(DOXYGEN_PREDEFINED "EIGEN_ALIGN16=" "PCL_MAKE_ALIGNED_OPERATOR_NEW="
+    "__extension__=" "DEFINE_SERIALIZABLE(class,namespace)=")
+  set(DOXYGEN_EXCLUDE_SYMBOLS pcl)
+  set(DOXYGEN_QUIET YES)
+  doxygen_add_docs(docs ${headers} COMMENT "The reference of the public headers")
+endif()
