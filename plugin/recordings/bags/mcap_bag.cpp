@@ -80,7 +80,8 @@ bool McapBag::readSummary() {
   ByteReader bytes(tail.get(), tail_size);
   const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
   const std::uint64_t size = bytes.number<std::uint64_t>();
-  const auto [summary, offsets, checksum] = takeMcapFields<McapFooter>(bytes);
+  const auto fields = takeMcapFields<McapFooter>(bytes);
+  const std::uint64_t summary = fields.summary;
   if (op != McapOp::kFooter || size != kMcapFooterContent || bytes.text(magic) != kMcapMagic) {
     return false;  // the recording was cut off
   }
@@ -92,8 +93,9 @@ bool McapBag::readSummary() {
 
   const auto section = readBytes(summary, fileSize() - summary);
   located(summary, [&] {
-    requireChecksum(checksum, section.get(),
-                    footer - summary + kMcapRecordHead + kMcapFooterContent - sizeof(checksum));
+    requireChecksum(
+        fields.checksum, section.get(),
+        footer - summary + kMcapRecordHead + kMcapFooterContent - sizeof(fields.checksum));
   });
   // Chunks refer to channels, which may come after them.
   std::vector<std::pair<std::uint64_t, ByteReader>> indexes;

@@ -12,8 +12,8 @@
 
 /// The structure of MCAP files (mcap.dev/spec), for reader and writer: a magic word, records and
 /// the magic word again. A record has an op, a size of 64 bits and its content: the fields of its
-/// type below, little-endian. A text has a size of 32 bits before it; so have arrays and maps,
-/// which are texts here.
+/// type below, little-endian. A text has a size of 32 bits before it. Arrays and maps are stored
+/// the same way; here they are texts.
 namespace efm {
 
 inline constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
@@ -40,7 +40,7 @@ struct McapHeader {
 
 struct McapFooter {
   static constexpr McapOp kOp = McapOp::kFooter;
-  std::uint64_t summary = 0, summary_offsets = 0;  ///< Bytes of the file; 0: the file has none.
+  std::uint64_t summary = 0, summary_offsets = 0;  ///< Positions in the file, bytes; 0: none.
   std::uint32_t checksum = 0;  ///< Of the bytes from the summary to this field; 0: unknown.
   auto fields() { return std::tie(summary, summary_offsets, checksum); }
 };
