@@ -2,6 +2,15 @@
 # What `cmake --install` gives: the program, both libraries with the headers that their users need, the CMake package
 # event-fusion-mapper with the targets efm::engine and efm::mrpt, a file for pkg-config, option files and examples.
 include(CMakePackageConfigHelpers)
+include(CheckCXXSourceCompiles)
+
+foreach(folder IN ITEMS LIBDIR INCLUDEDIR DATADIR)
+  if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
+    message(FATAL_ERROR
+      "CMAKE_INSTALL_${folder} = ${CMAKE_INSTALL_${folder}}: expected a path relative to the prefix, "
+      "because libraries and package find each other by relative paths")
+  endif()
+endforeach()
 
 set(EFM_INCLUDE_DIR "${CMAKE_INSTALL_INCLUDEDIR}/event-fusion-mapper")
 set(EFM_PACKAGE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/event-fusion-mapper")
@@ -38,11 +47,22 @@ efm_install_headers(event_fusion/engine.h plugin/mrpt/CObservationEvents.h)
 # The libraries that the program loads when they are needed lie beside the engine.
 set_target_properties(event-fusion PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
 set_target_properties(mrpt-event-fusion event-fusion-window PROPERTIES INSTALL_RPATH "$ORIGIN")
-set_target_properties(efm_engine mrpt-event-fusion PROPERTIES
-  VERSION "${PROJECT_VERSION}"
-  SOVERSION "${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")
 set_target_properties(efm_engine PROPERTIES EXPORT_NAME engine)
 set_target_properties(mrpt-event-fusion PROPERTIES EXPORT_NAME mrpt)
+# Eigen's types have another alignment if a program is compiled for another processor: engine.h compares.
+set(CMAKE_REQUIRED_LIBRARIES Eigen3::Eigen)
+foreach(bytes IN ITEMS 0 16 32 64)
+  check_cxx_source_compiles("
+    #include <Eigen/Core>
+    static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == ${bytes});
+    int main() {}" EFM_EIGEN_ALIGNS_TO_${bytes})
+  if(EFM_EIGEN_ALIGNS_TO_${bytes})
+    set(EFM_EIGEN_ALIGN ${bytes})
+    break()
+  endif()
+endforeach()
+target_compile_definitions(efm_engine INTERFACE
+  "$<INSTALL_INTERFACE:EFM_EIGEN_ALIGN=${EFM_EIGEN_ALIGN}>")
 foreach(target IN ITEMS efm_engine mrpt-event-fusion)
   target_include_directories(${target} INTERFACE "$<INSTALL_INTERFACE:${EFM_INCLUDE_DIR}>")
 endforeach()
@@ -69,11 +89,12 @@ configure_file(cmake/event-fusion-mapper.pc.in event-fusion-mapper.pc @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/event-fusion-mapper.pc"
   DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
+install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(DIRECTORY config examples DESTINATION "${EFM_DATA_DIR}" USE_SOURCE_PERMISSIONS)
 
 # The reference of the public headers: cmake --build … --target docs writes docs/html in the build folder.
 find_package(Doxygen QUIET)
-if(DOXYGEN_FOUND)
+if(DOXYGEN_FOUND AND PROJECT_IS_TOP_LEVEL)
   get_property(headers GLOBAL PROPERTY EFM_PUBLIC_HEADERS)
   list(REMOVE_DUPLICATES headers)
   set(DOXYGEN_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/docs")

@@ -23,7 +23,7 @@ program=prefix/bin/event-fusion
 $program map -q "$recording" --out out
 $program import -q "$recording" --out recording.rawlog
 build/map_recording example_out "$recording" >/dev/null
-build/own_data "$recording" >own.log
+build/own_data "$recording" "$recording/poses.txt" >own.log
 build/mrpt_host recording.rawlog >/dev/null
 for map in example_out/map.pcd own.pcd mrpt.pcd; do
   cmp out/map.pcd $map || fail "$map is not the program's map"
@@ -32,7 +32,9 @@ done
   fail "own_data delivers other keyframes"
 build/live "$recording" >live.log
 grep -q '^[1-9][0-9]* keyframes, [1-9][0-9]* points in live.pcd, ' live.log || fail "live: $(tail -n 1 live.log)"
-$program map -q --config simulated_stereo --help >/dev/null || fail "the option files are not found"
+[ -s out/map.simplemap ] || fail "the program does not find MRPT's library"
+cp prefix/share/event-fusion-mapper/config/simulated_stereo.ini prefix/share/event-fusion-mapper/config/only_here.ini
+$program map -q "$recording" --config only_here --out by_name || fail "the installed option files are not found"
 
 # Another minor version is another interface. An unknown component is named.
 request() {  # ARGUMENTS of find_package
@@ -43,6 +45,7 @@ request() {  # ARGUMENTS of find_package
 request "${version%.*}" || fail "version ${version%.*} is not found"
 for wrong in 0.1 0.99 1.0; do
   ! request $wrong || fail "version $version is taken for $wrong"
+  grep -q "event-fusion-mapper-config.cmake, version: $version" request.log || fail "$(tail -n 9 request.log)"
 done
 ! request "COMPONENTS gui" || fail "component gui is found"
 grep -q 'There is no component gui' request.log || fail "$(tail -n 5 request.log)"
@@ -51,9 +54,12 @@ grep -q 'There is no component gui' request.log || fail "$(tail -n 5 request.log
 flags=$(PKG_CONFIG_PATH=$(dirname "$pc") pkg-config --cflags --libs event-fusion-mapper)
 # shellcheck disable=SC2086
 c++ examples/map_recording.cpp -o by_pkg_config $flags -Wl,-rpath,"$libraries" || fail "pkg-config: $flags"
-ldd by_pkg_config | grep -q "libevent-fusion.so.* => $libraries" || fail "pkg-config gives another library"
-! ldd "$libraries/libevent-fusion.so" | grep -q mrpt || fail "the engine needs MRPT"
+ldd by_pkg_config >ldd.txt
+grep -q "libevent-fusion.so.* => $libraries" ldd.txt || fail "pkg-config gives another library: $(cat ldd.txt)"
+ldd "$libraries/libevent-fusion.so" >ldd.txt
+! grep mrpt ldd.txt || fail "the engine needs MRPT"
 
 # What was installed needs neither the source tree nor the build tree.
-! grep -rl -e "$build" --include='*.cmake' --include='*.pc' --include='*.h' prefix || fail "the package has paths of the build"
+source=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
+! grep -rl -e "$build" -e "$source" --include='*.cmake' --include='*.pc' --include='*.h' prefix || fail "the package has paths of the build"
 echo passed

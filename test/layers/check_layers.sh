@@ -52,6 +52,7 @@ forbid plugin "$pcl" "PCL stays in maps/ (map_point.h is its header) and cloud_a
 forbid plugin "$ceres" "refinement is reached through maps/"
 forbid plugin "$recordings" "HDF5 stays in plugin/recordings/columns/ and writers/" '^plugin/recordings/(columns|writers)/'
 
+forbid include "$mrpt|$ceres|$recordings|$front|pcl/|tbb|nlohmann|fmt/" "the public header: Eigen, OpenCV, PCL by map_point.h"
 forbid plugin "$mrpt" "MRPT stays in mrpt/" '^plugin/mrpt/'
 
 # Every folder is in the table, and includes only the folders that the table allows it.

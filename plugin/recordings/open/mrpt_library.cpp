@@ -32,7 +32,7 @@ void* symbolOf(const std::string& library, const std::string& symbol, const std:
 
 const MrptLibrary& mrptLibrary(const std::string& for_what) {
   return *static_cast<const MrptLibrary*>(
-      symbolOf("libmrpt-event-fusion.so", "efmMrptLibrary", for_what));
+      symbolOf("libmrpt-event-fusion.so." EFM_SOVERSION, "efmMrptLibrary", for_what));
 }
 
 }  // namespace efm
