@@ -16,24 +16,39 @@
 #include "plugin/session/sample.h"
 #include "plugin/session/session_status.h"
 
-/// @mainpage event-fusion-mapper
-/// The engine: events of calibrated cameras and poses of a tracker in, keyframe depth maps and one
-/// point cloud out. A program needs this header alone. Times are nanoseconds, lengths metres;
-/// `T_a_b` maps coordinates of frame b to frame a: p_a = T_a_b * p_b. Frames: `world`, `rig` (the
-/// tracked body), `cam` (x right, y down, z forward), `ref` (a keyframe's view, as `cam`).
+/// @mainpage
+/// The engine of event-fusion-mapper: events of calibrated cameras and poses of a tracker in,
+/// keyframe depth maps and one point cloud out. A program needs this header alone:
+///
+/// - efm::Mapper maps cameras, events and poses that a program has (`addCamera`, `addEvents`,
+///   `addPose`), or the samples of a recording; while they come, or beside a sensor.
+/// - efm::openRecording reads a recording of any format.
+/// - efm::mapRecording maps a whole recording into a folder.
+/// - efm::Options are the options of all. share/event-fusion-mapper/config/default.ini lists them,
+///   share/event-fusion-mapper/examples has four programs.
+///
+/// Times are nanoseconds, lengths metres; `T_a_b` maps coordinates of frame b to frame a:
+/// p_a = T_a_b * p_b. Frames: `world`; `rig` (the common frame of the cameras, often camera 0);
+/// `body` (what the tracker tracks, if it is not the rig: option `rig.hand_eye`); `cam` (x right,
+/// y down, z forward); `ref` (a keyframe's view, as `cam`).
 namespace efm {
+
+#ifdef EFM_EIGEN_ALIGN  // of the installed engine
+static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == EFM_EIGEN_ALIGN,
+              "the engine was compiled for another processor (-march), so that types of Eigen have "
+              "another alignment: compile all files with -DEIGEN_MAX_STATIC_ALIGN_BYTES=16, or the "
+              "engine with the same -march");
+#endif
 
 class MapperCore;
 class OptionReader;
 struct EventFusionOptions;
 
-/// Options, with the keys of option files (config/default.ini lists all with their ranges). By
-/// default depth limits, planes and windows are chosen from the data.
+/// Options with the keys of option files. By default depth limits, planes and windows are chosen
+/// from the data.
 class Options {
  public:
   Options();
-  /// Takes the values as they are, checked by the caller.
-  Options(const EventFusionOptions& values);  // NOLINT(google-explicit-constructor)
 
   /// Sets an option: set("dsi.max_depth_m", "8"). Ranges are checked when the options are used: a
   /// Mapper or `mapRecording` throws std::invalid_argument with key, value and allowed range.
@@ -41,12 +56,12 @@ class Options {
   void set(std::string_view key, std::string_view value);
   /// Sets the options of an .ini file; other options keep their values.
   /// @param ini a file, or the name of an installed one: "davis346_mvsec".
-  /// @throws std::runtime_error if the file cannot be read; std::invalid_argument as `set`, naming
-  /// file and line.
+  /// @throws std::invalid_argument if there is no such file, or as `set`, naming file and line.
   void read(const std::filesystem::path& ini);
 
-  /// Returns all values. @throws std::invalid_argument if a value is out of range.
-  EventFusionOptions values() const;
+  // For code of this project: the headers of EventFusionOptions are not installed.
+  Options(const EventFusionOptions& unchecked);  // NOLINT(google-explicit-constructor)
+  EventFusionOptions values() const;  ///< @throws std::invalid_argument at a wrong value.
 
  private:
   template <typename Change>
@@ -73,12 +88,13 @@ std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path
 
 using Keyframe = KeyframeDepthMap;
 
-/// Turns events and poses into keyframes and one map. Thread-safe; mapper_core.h has the details.
+/// Turns events and poses into keyframes and one map. Thread-safe.
 ///
 /// In playback the caller's thread maps: a call returns when all windows that became complete are
 /// mapped, or throws the first error. The same samples give the same map, bit for bit, on any
 /// number of threads. Automatic options are chosen at `finish`, or when `live.max_queue_mb` of
-/// events wait: nothing is mapped before.
+/// events wait: nothing is mapped before. If the input makes no keyframe, nothing is thrown:
+/// `warnings` says why.
 ///
 /// In live operation (`live.enabled`) a thread of the mapper maps. Adding never waits, and queries
 /// return the newest published state. If too much input waits, the oldest windows are dropped.
@@ -91,8 +107,8 @@ class Mapper {
     std::function<void(const Keyframe&)> on_keyframe;  ///< In the order of their windows.
     /// Live operation: receives each new snapshot of the map.
     std::function<void(const std::shared_ptr<const MapSnapshot>&)> on_map;
-    std::function<void(const std::string&)> warn;
-    std::function<void(const std::string&)> info;
+    std::function<void(const std::string&)> warn;  ///< Live losses and errors; wrong poses.
+    std::function<void(const std::string&)> info;  ///< The chosen options, with their reasons.
   };
 
   /// @param earlier keyframes of an initial map.
@@ -105,16 +121,23 @@ class Mapper {
   Mapper(const Mapper&) = delete;
   Mapper& operator=(const Mapper&) = delete;
 
-  // Own data. Poses may come before or after the events of their time.
+  // Own data. Events and poses of the same time may come in any order.
 
   /// Adds a camera. @return its index, from 0.
+  /// @param camera T_rig_cam has a unit quaternion.
   /// @throws std::invalid_argument if a value is not valid; std::logic_error after `addEvents`.
   int addCamera(const RigCamera& camera);
-  /// Adds the next events of a camera; events up to 10 ms out of order are sorted.
-  /// @throws std::invalid_argument as `add`, or if there is no such camera.
+  /// Adds the next events of a camera, on the camera's clock. Events that are up to 10 ms out of
+  /// order are sorted. After an error, no event of this call is added.
+  /// @throws std::invalid_argument if an event is outside the sensor or older than that, or if
+  /// there is no such camera.
   void addEvents(int camera, std::vector<Event> events);
-  /// Adds a pose, rounded as in recordings: time to 100 ns, rotation in its last digits.
+  /// Adds the next pose, on the clock of the poses; the rotation is normalised. The pose is rounded
+  /// as the poses of recordings are (time to 100 ns, rotation in its last digit), so that the same
+  /// poses make the same map in every way. Of two poses of the same time the first one is used.
   /// @param noise standard deviations that the tracker states, for the refinement.
+  /// @throws std::invalid_argument if the pose is not finite, or a second older than the newest
+  /// one.
   void addPose(const StampedPose& pose, const std::optional<PoseNoise>& noise = std::nullopt);
 
   // Samples of a recording.
@@ -141,11 +164,12 @@ class Mapper {
   std::shared_ptr<const MapSnapshot> keyframes() const;
   std::vector<StampedPose> trajectory() const { return keyframes()->trajectory; }
   SessionStatus status() const;
-  /// Returns the warnings so far: wrong or missing poses, unused data, why there is no keyframe.
-  /// `mapRecording` has more: it looks at the whole recording first.
+  /// Returns the warnings so far: poses and cameras that do not explain the events, implausible
+  /// own data, unused data, and after `finish` why there is no keyframe. Own events are judged in
+  /// playback, poses against events if options are automatic; `mapRecording` judges always.
   std::vector<Warning> warnings() const;
 
-  /// Returns more for hosts in this project: mapper_core.h, which is not installed.
+  /// For hosts in this project: mapper_core.h is not installed.
   MapperCore& core() const { return *core_; }
 
  private:
@@ -165,8 +189,9 @@ struct Report {
 /// data are chosen from the whole recording first. The folder gets map.pcd, map.html, keyframes/,
 /// trajectory.txt, report.json and pictures; an earlier result there is replaced.
 /// @param files, overrides see `openRecording`.
-/// @throws std::exception if the recording cannot be read to its end, or a file cannot be written.
-/// The data before the damage are mapped and written all the same.
+/// @throws std::invalid_argument if an option is out of range; std::runtime_error if the recording
+/// cannot be read to its end, has no keyframe, or a file cannot be written. The data before the
+/// damage are mapped and written all the same.
 Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options = {},
                     const Overrides& overrides = {});
@@ -174,7 +199,8 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
 /// Writes a binary PCD file with the fields of MapPoint. The file appears when it is complete.
 /// @throws std::runtime_error naming the file.
 void writePcd(const std::filesystem::path& file, const MapCloud& cloud);
-/// Writes a binary PLY file, coloured by height along the world's z axis.
+/// Writes a binary PLY file, coloured by height along the world's z axis. (map.ply of a recording
+/// is coloured along the mean upward axis of its cameras.)
 void writePly(const std::filesystem::path& file, const MapCloud& cloud);
 
 }  // namespace efm

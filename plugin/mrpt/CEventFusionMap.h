@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "event_fusion/engine.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/mrpt_point_maps.h"
+#include "plugin/session/map_snapshot.h"
 
 namespace efm {
 

@@ -28,7 +28,7 @@ fs::path configFolder() {
   if (dladdr(reinterpret_cast<void*>(&configFolder), &own) != 0) {
     const fs::path library = fs::weakly_canonical(own.dli_fname, error);
     const fs::path installed = library.parent_path() / EFM_DATA_FROM_LIBRARY / "config";
-    if (fs::is_directory(installed, error)) return installed;
+    if (!error && fs::is_directory(installed, error)) return installed;
   }
   const fs::path source = EFM_CONFIG_DIR;
   return fs::is_directory(source, error) ? source : fs::path();

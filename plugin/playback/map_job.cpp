@@ -362,8 +362,6 @@ void MapSteps::rethrow(int written) const {
     throw;
   } catch (const Interrupted&) {
     throw;
-  } catch (const OptionError&) {
-    throw;
   } catch (const std::runtime_error& error) {
     if (output && output->keepsEarlier()) throw std::runtime_error(userMessage(error) + stays());
     if (written == 0) throw;
@@ -523,12 +521,15 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
   job.source.poses = overrides.poses;
   job.source.calibration = overrides.calibration;
   job.source.hand_eye = overrides.hand_eye;
+  job.source.calibration_given = "calibration";
+  job.source.hand_eye_given = "hand_eye";
   job.options = options.values();
   job.options.mapper.limits = overrides.limits;
   job.options.mapper.limits.validate();
   job.out = out;
   job.prepare();
   MapResult result = mapInto(std::move(job));
+  if (result.error && result.error->wrong) throw std::invalid_argument(result.error->text);
   if (result.error) throw std::runtime_error(result.error->text);
   MapReport& report = result.report;
   std::string json = reportJson(report);

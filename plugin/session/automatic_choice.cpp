@@ -104,6 +104,7 @@ bool MappingSession::chooseFromFirstLook() {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
                                       finished_ ? survey.duration_s : std::nullopt, chosen);
+  status_.pose_warnings = survey.judgePoses(chosen).warnings;
   if (finished_) {  // no more data: following limits would be no better
     use(std::move(choice), chosen);
     depth_follower_.reset();

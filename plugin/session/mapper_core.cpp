@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/health_checks.h"
@@ -35,10 +36,9 @@ EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const R
 MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                        const std::vector<StoredKeyframe>& earlier)
     : options_(options.live),
-      mapper_options_(options.mapper),
       callbacks_(std::move(callbacks)),
       setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
-      poses_(statisticsOptions(withSetup(options, setup_))),
+      statistics_(statisticsOptions(withSetup(options, setup_))),
       session_(withSetup(options, setup_)) {
   for (const StoredKeyframe& keyframe : earlier) {
     session_.insertEarlier(pointsInWorld(*keyframe.points, keyframe.T_world_ref),
@@ -49,6 +49,7 @@ MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
   if (!options_.enabled) return;
   queue_ = std::make_unique<InputQueue>(options_);
   status_ = session_.status();
+  used_options_ = session_.usedOptions();
   map_ = makeSnapshot(true);
   thread_ = std::thread([this] {  // waits: no input before the constructor returns
     worker_ = std::this_thread::get_id();
@@ -90,47 +91,87 @@ void MapperCore::addEvents(int camera, std::vector<Event> events) {
           "events of camera {}: expected one of the {} added cameras", camera, cameras_.size()));
     }
     packet.num_cameras = static_cast<int>(cameras_.size());
-    for (std::size_t c = 0; c < cameras_.size() && !announced_; ++c) {
-      packet.camera = static_cast<int>(c);
-      packet.calibration = cameras_[c];
-      add(packet);
-    }
-    announced_ = true;
+    if (!std::exchange(announced_, true)) announce(packet);
     packet.calibration = cameras_[index];
   }
   packet.camera = camera;
   packet.events = std::move(events);
+  if (!queue_) {  // in live operation this time is the sensor's
+    const std::lock_guard<std::mutex> lock(statistics_mutex_);
+    statistics_.addEvents(packet);
+  }
   add(std::move(packet));
 }
 
+/// Adds an empty packet of each camera. It maps nothing, so no callback waits for cameras_mutex_.
+void MapperCore::announce(EventPacket packet) {
+  Batch batch;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    packet.camera = static_cast<int>(c);
+    packet.calibration = cameras_[c];
+    if (queue_) {
+      queue_->add(packet);
+    } else {
+      batch.packets.push_back(packet);
+    }
+  }
+  std::exception_ptr error;
+  if (!queue_) feed(std::move(batch), error);
+  if (error) std::rethrow_exception(error);
+}
+
+/// Returns why there is no keyframe. @return std::nullopt if there is one, or the input goes on.
+std::optional<Warning> MapperCore::noKeyframe(const SessionStatus& state,
+                                              const FusionMapperOptions& options) const {
+  if (state.counts.keyframes > 0) return std::nullopt;
+  return Warning{"no-keyframe",
+                 fmt::format("there is no keyframe: {}", whyNoKeyframe(state, options).what())};
+}
+
 std::vector<Warning> MapperCore::warnings() const {
-  const SessionStatus state = status();
   bool ended = false;
   {
-    const std::lock_guard<std::mutex> lock(queue_ ? mutex_ : session_mutex_);
-    ended = queue_ ? ended_ : finished_;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ended = ended_;
   }
-  const std::lock_guard<std::mutex> lock(poses_mutex_);
-  Findings findings{poses_, {}};
-  findings.use(mapper_options_.keyframe.planes, state.chosen);
-  findings.max_pose_gap_s = mapper_options_.trajectory.max_pose_gap_s;
+  const FusionMapperOptions options = usedOptions();
+  const SessionStatus state = status();
+  RecordingStatistics statistics;
+  {
+    const std::lock_guard<std::mutex> lock(statistics_mutex_);
+    statistics = statistics_;
+  }
+  statistics.setCameras(state.rig.cameras);
+  Findings findings{statistics, {}};
+  findings.use(options.keyframe.planes, state.chosen);
+  findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
   findings.session = &state;
-  findings.options = &mapper_options_;
+  findings.options = &options;
   std::vector<Warning> warnings = warningsOf(findings);
-  if (ended && state.counts.keyframes == 0) {
-    addWarning(warnings, "no-keyframe", "there is no keyframe: {}",
-               whyNoKeyframe(state, mapper_options_).what());
-  }
+  const auto no_keyframe = ended ? noKeyframe(state, options) : std::nullopt;
+  if (no_keyframe) warnings.insert(warnings.begin(), *no_keyframe);
   return warnings;
+}
+
+FusionMapperOptions MapperCore::usedOptions() const {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return used_options_;
+  }
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  return session_.usedOptions();
+}
+
+/// Warns of an input that made no keyframe, and lets `warnings` say so from now on.
+void MapperCore::noteEnd(std::exception_ptr& error) {
+  if (const auto warning = noKeyframe(status(), usedOptions())) {
+    warn(warning->name + ": " + warning->text, error);
+  }
 }
 
 void MapperCore::add(Sample sample) {
   auto* const packet = std::get_if<EventPacket>(&sample);
   auto* const pose = std::get_if<PoseSample>(&sample);
-  if (pose) {
-    const std::lock_guard<std::mutex> lock(poses_mutex_);
-    poses_.addPose(*pose);
-  }
   if (queue_) {
     if (packet) queue_->add(std::move(*packet));
     if (pose) queue_->add(std::move(*pose));
@@ -158,7 +199,15 @@ void MapperCore::finish() {
   if (!queue_) {
     Batch end;
     end.ended = true;
-    return workHere(std::move(end));
+    workHere(std::move(end));
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (std::exchange(ended_, true)) return;
+    }
+    std::exception_ptr error;
+    noteEnd(error);
+    if (error) std::rethrow_exception(error);
+    return;
   }
   if (runsHere()) throw std::logic_error("the mapping cannot be finished from its own callback");
   queue_->end();
@@ -213,6 +262,7 @@ bool MapperCore::runOnce() {
       publishMap(true, error);
       publishState(error);
       warnOfLosses();
+      noteEnd(error);
       endRun(end_error);
       return false;
     }
@@ -244,7 +294,11 @@ void MapperCore::feed(Batch batch, std::exception_ptr& error) {
       throw std::logic_error("input after the end: `finish` was called");
     }
     for (const PoseSample& pose : batch.poses) {
-      attempt(of_input, Fault::kPose, "", [&] { session_.addPose(pose); });
+      attempt(of_input, Fault::kPose, "", [&] {
+        session_.addPose(pose);
+        const std::lock_guard<std::mutex> poses_lock(statistics_mutex_);
+        statistics_.addPose(pose);
+      });
     }
     for (const auto& missing : batch.missing) {
       attempt(of_input, Fault::kMapping, "the choice of options",
@@ -400,6 +454,7 @@ void MapperCore::publishMap(bool at_once, std::exception_ptr& error) {
 /// playback the caller gets these errors.
 void MapperCore::publishState(std::exception_ptr& error) {
   SessionStatus status;
+  FusionMapperOptions used;
   bool is_new_choice = false;
   {
     const std::lock_guard<std::mutex> lock(session_mutex_);
@@ -407,13 +462,19 @@ void MapperCore::publishState(std::exception_ptr& error) {
     is_new_choice = std::exchange(logged_choices_, choices) != choices;
     if (!queue_ && !is_new_choice) return;
     status = session_.status();
+    used = session_.usedOptions();
   }
   if (is_new_choice) {
     callBack(error, "the callback of the log", [&] {
       if (callbacks_.info) callbacks_.info(choiceText(status));
-      if (!status.scene_unknown || !callbacks_.warn) return;
-      const Warning warning = noSceneWarning();
-      callbacks_.warn(warning.name + ": " + warning.text);
+      if (!callbacks_.warn) return;
+      std::vector<Warning> warnings = status.pose_warnings;
+      if (status.scene_unknown && status.events && status.poses) {
+        warnings.push_back(noSceneWarning());
+      }
+      for (const Warning& warning : warnings) {
+        callbacks_.warn(warning.name + ": " + warning.text);
+      }
     });
   }
   if (!queue_) return;
@@ -425,6 +486,7 @@ void MapperCore::publishState(std::exception_ptr& error) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_ = std::move(status);
+    used_options_ = std::move(used);
   }
   if (!failure.empty()) warn(failure, error);
 }

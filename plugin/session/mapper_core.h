@@ -29,8 +29,8 @@
 
 namespace efm {
 
-/// What a Mapper has, shared with the thread of live operation: its owner may be gone before the
-/// thread ends. Functions without a comment are those of Mapper.
+/// The state of a Mapper. The thread of live operation shares it, so it may outlive the Mapper.
+/// Functions without a comment are those of Mapper.
 ///
 /// In playback, if a window cannot be mapped (no memory, a sink that throws), the next call tries
 /// it again. If its keyframe cannot be stored, the window is dropped. A query waits while a
@@ -86,7 +86,12 @@ class MapperCore {
   using Clock = std::chrono::steady_clock;
 
   // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
+  FusionMapperOptions usedOptions() const;
+  std::optional<Warning> noKeyframe(const SessionStatus& state,
+                                    const FusionMapperOptions& options) const;
+  void noteEnd(std::exception_ptr& error);
   void workHere(Batch batch);
+  void announce(EventPacket packet);
   void run();
   bool runOnce();
   void feed(Batch batch, std::exception_ptr& error);
@@ -107,7 +112,6 @@ class MapperCore {
   void warnOfLosses();
 
   const LiveOptions options_;
-  const FusionMapperOptions mapper_options_;
   const Callbacks callbacks_;
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
@@ -115,8 +119,8 @@ class MapperCore {
   std::mutex cameras_mutex_;               // guards the cameras that the host adds
   std::vector<RigCamera> cameras_;         // by `addCamera`
   bool announced_ = false;                 // the session knows them
-  mutable std::mutex poses_mutex_;         // guards poses_
-  RecordingStatistics poses_;              // of the poses alone
+  mutable std::mutex statistics_mutex_;    // guards statistics_; held for copies only
+  RecordingStatistics statistics_;         // of the poses, and in playback of own events
   std::atomic<std::thread::id> worker_{};  // its thread in live operation
   std::mutex join_mutex_;                  // guards thread_
 
@@ -148,6 +152,7 @@ class MapperCore {
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
   SessionStatus status_;
+  FusionMapperOptions used_options_;  // in live operation: with the chosen options
   LiveStatus live_;
   std::shared_ptr<const MapSnapshot> map_;
   cv::Mat1f newest_depth_;

@@ -102,6 +102,8 @@ class MappingSession {
   };
   Chosen chosen() const { return {newest_planes_.value_or(planes()), status_.choices}; }
   SessionStatus status() const;
+  /// Returns the options in use; automatic options have their chosen values.
+  const FusionMapperOptions& usedOptions() const { return options_.mapper; }
 
  private:
   const DepthPlanesOptions& planes() const {

@@ -156,6 +156,8 @@ struct SessionStatus {
   std::vector<ChosenOption> chosen;      ///< Automatic options, with their reasons.
   std::uint64_t choices = 0;             ///< Number of times that options were chosen.
   bool scene_unknown = false;            ///< True if the last choice found no scene: it is a guess.
+  /// Playback with automatic options: the poses do not explain the events of the first look.
+  std::vector<Warning> pose_warnings;
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
   std::optional<LiveStatus> live{};           ///< Set in live operation.
 };

@@ -236,6 +236,7 @@ std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts)
 void checkSession(const Findings& findings, Warnings& warnings) {
   if (!findings.session) return;
   const SessionStatus& status = *findings.session;
+  append(warnings, status.pose_warnings);
   addUnusedEvents(status, *findings.options, warnings);
   addSilence(status, findings.options->keyframe.exclude_silent, warnings);
   addUnusedPoses(status, warnings);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "event_fusion/engine.h"
 #include "test/integration/mistakes.h"
 #include "test/plugin/app/app_test.h"
 
@@ -117,6 +118,47 @@ TEST_F(Mistakes, AreNotSeenWhereThereAreNone) {
                               " --set keyframes.window_s=0.1 --strict --out out_" + preset);
     EXPECT_EQ(mapped.status, 0) << preset << ":\n" << mapped.err;
     EXPECT_THAT(mapped.err, Not(HasSubstr("warning"))) << preset;
+  }
+}
+
+TEST_F(Mistakes, OfOwnDataAreNamedToo) {
+  const std::vector<RigCamera> cameras = openRecording({folder() / "base"})->rig().cameras;
+  const struct {
+    const char* warning;
+    std::function<void(DraftRecording&)> make;
+  } kMistakes[] = {
+      {"", [](DraftRecording&) {}},
+      {"cameras-swapped ",
+       [](DraftRecording& draft) { std::swap(draft.events[0], draft.events[1]); }},
+      {"poses-inverted ",
+       [](DraftRecording& draft) {
+         for (StampedPose& pose : draft.poses) pose.T_world_rig = pose.T_world_rig.inverse();
+       }},
+      {"time-shift ",
+       [](DraftRecording& draft) {
+         for (StampedPose& pose : draft.poses) pose.t_ns += 100'000'000;
+       }},
+      {"polarity ",
+       [](DraftRecording& draft) {
+         for (Event& event : draft.events[0]) event.polarity = true;
+       }},
+  };
+  for (const auto& mistake : kMistakes) {
+    DraftRecording draft = base_;
+    mistake.make(draft);
+    std::string logged;
+    Mapper::Callbacks callbacks;
+    callbacks.warn = [&](const std::string& text) { logged += text; };
+    Mapper mapper({}, callbacks);
+    for (const RigCamera& camera : cameras) mapper.addCamera(camera);
+    for (const StampedPose& pose : draft.poses) mapper.addPose(pose);
+    for (int c = 0; c < 2; ++c) mapper.addEvents(c, draft.events[static_cast<std::size_t>(c)]);
+    mapper.finish();
+    std::string names;
+    for (const Warning& warning : mapper.warnings()) names += warning.name + " ";
+    EXPECT_THAT(names, HasSubstr(mistake.warning));
+    EXPECT_EQ(names.empty(), *mistake.warning == '\0') << names;
+    EXPECT_EQ(logged.empty(), names.empty() || names == "polarity ") << logged << names;
   }
 }
 

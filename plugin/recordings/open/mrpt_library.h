@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "event_fusion/engine.h"
 #include "plugin/recordings/streams/recording_parts.h"
+#include "plugin/session/map_snapshot.h"
 #include "plugin/session/map_watcher.h"
 #include "plugin/session/sample.h"
 

@@ -424,6 +424,8 @@ std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path
   source.poses = overrides.poses;
   source.calibration = overrides.calibration;
   source.hand_eye = overrides.hand_eye;
+  source.calibration_given = "calibration";
+  source.hand_eye_given = "hand_eye";
   source.limits = overrides.limits;
   return openRecording(source);
 }
