@@ -4,6 +4,7 @@
 #include <event_fusion/engine.h>
 
 #include <chrono>
+#include <future>
 #include <iostream>
 #include <thread>
 
@@ -32,12 +33,13 @@ int main(int argc, char** argv) try {
     std::cout << "keyframe at " << keyframe.window.t_ref_ns << " ns, camera at "
               << keyframe.T_world_ref.translation.transpose() << " m" << std::endl;
   };
+  callbacks.info = [](const std::string& text) { std::cout << text << std::endl; };
   callbacks.warn = [](const std::string& text) { std::cerr << "warning: " << text << '\n'; };
   efm::Mapper mapper(options, callbacks);
 
   const auto recording = efm::openRecording({argv + 1, argv + argc});
-  std::thread driver(feed, std::ref(*recording), std::ref(mapper));
-  driver.join();
+  auto driver = std::async(std::launch::async, feed, std::ref(*recording), std::ref(mapper));
+  driver.get();  // throws the error of the thread, if there is one
   mapper.finish();
   efm::writePcd("live.pcd", *mapper.points());
   const efm::SessionStatus status = mapper.status();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The map builder in an MRPT program with a driver and a tracker of its own: mrpt_host
-// RECORDING.rawlog makes mrpt.pcd. The builder is made by its name: a program needs its header only
-// for more than MRPT's interface.
+// RECORDING.rawlog makes mrpt.pcd. The builder is made by its name, and used through MRPT's
+// interface.
 #include <mrpt/io/CFileGZInputStream.h>
 #include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CObservationComment.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Events and poses in memory to depth maps and a cloud: own_data RECORDING… makes own.pcd.
+// Events and poses in memory to depth maps and a cloud: own_data RECORDING POSES.txt makes own.pcd.
 #include <event_fusion/engine.h>
 
 #include <iostream>
@@ -25,14 +25,13 @@ efm::MapCloud::ConstPtr mapOf(const std::vector<efm::RigCamera>& cameras,
 }
 
 int main(int argc, char** argv) try {
-  // Your driver and your tracker fill these arrays. Here a recording does.
-  const auto recording = efm::openRecording({argv + 1, argv + argc});
+  if (argc != 3) throw std::runtime_error("usage: own_data RECORDING POSES.txt");
+  // Your driver and your tracker fill these arrays. Here a recording and a file of poses do.
+  const std::vector<efm::StampedPose> poses = efm::readTumTrajectory(argv[2]);
+  const auto recording = efm::openRecording({argv[1]}, {argv[2]});
   std::vector<std::vector<efm::Event>> events(recording->rig().cameras.size());
-  std::vector<efm::StampedPose> poses;
   while (const auto sample = recording->next()) {
-    if (const auto* pose = std::get_if<efm::PoseSample>(&*sample)) {
-      poses.push_back({pose->t_ns, pose->T_world_body * pose->T_body_rig});
-    } else if (const auto* packet = std::get_if<efm::EventPacket>(&*sample)) {
+    if (const auto* packet = std::get_if<efm::EventPacket>(&*sample)) {
       std::vector<efm::Event>& all = events[packet->camera];
       all.insert(all.end(), packet->events.begin(), packet->events.end());
     }
