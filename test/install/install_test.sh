@@ -18,6 +18,9 @@ cp -r prefix/share/event-fusion-mapper/examples .
 cmake -S examples -B build -DCMAKE_PREFIX_PATH="$PWD/prefix" -DCMAKE_BUILD_TYPE=Release >configure.log
 cmake --build build -j2 >build.log
 
+sed -n '/^```cpp$/,/^```$/{/^```/d;p}' "$(find prefix -name README.md)" >readme.cpp
+! grep -vxFf examples/own_data.cpp readme.cpp || fail "these lines of README are not in own_data.cpp"
+
 program=prefix/bin/event-fusion
 [ "$($program --version | head -n 1)" = "event-fusion $version" ] || fail "the program has another version than $version"
 $program map -q "$recording" --out out
