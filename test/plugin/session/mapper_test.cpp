@@ -150,6 +150,26 @@ TEST(Mapper, OwnDataMayComeInAnyOrderOfSensors) {
   }
 }
 
+TEST(Mapper, OwnDataMayComeFromAThreadPerSensor) {
+  const SyntheticRecording recording(0.8);
+  const auto expected = mapOf(syntheticOptions(), samplesOf(recording));
+  Mapper mapper(syntheticOptions());
+  for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+  std::vector<std::thread> sensors;
+  for (int camera : {0, 1}) {
+    sensors.emplace_back([&, camera] {
+      for (const Sample& sample : samplesOf(recording)) {
+        const auto* const packet = std::get_if<EventPacket>(&sample);
+        if (packet && packet->camera == camera) mapper.addEvents(camera, packet->events);
+      }
+    });
+  }
+  for (const StampedPose& pose : recording.poses) mapper.addPose(pose);
+  for (std::thread& sensor : sensors) sensor.join();
+  mapper.finish();
+  expectSameMap(*mapper.snapshot(), *expected);
+}
+
 TEST_P(MapperInEitherMode, WarningsSayWhyThereIsNoKeyframe) {
   const SyntheticRecording recording;
   const auto last_warning = [&](bool has_events, bool has_poses) {
