@@ -102,6 +102,7 @@ run_jobs() {
   host() {
     LD_LIBRARY_PATH="$bin/../lib" "$bin/mrpt_host" "$bin/../lib/libmrpt-event-fusion.so" "$@" || echo "exit status $?"
   }
+  # shellcheck disable=SC2034  # the commands of the table use it
   local i=$in
   while read -r name commands; do
     mkdir -p "$out/$name"
