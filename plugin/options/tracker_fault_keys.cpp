@@ -18,18 +18,25 @@ namespace {
 /// Reads the value of a fault. @return the expected kind of value if it is wrong, otherwise null.
 template <typename Field>
 const char* readFault(std::string_view text, const Allowed& allowed, Field& field) {
-  if constexpr (std::is_same_v<Field, std::uint64_t>) {
+  if constexpr (std::is_same_v<Field, TrackerClass>) {
+    try {
+      field = trackerClassFromName(text);
+    } catch (const std::invalid_argument&) {
+      return "good, typical, poor, car or none";
+    }
+  } else if constexpr (std::is_same_v<Field, std::uint64_t>) {
     const std::optional<std::int64_t> seed = parseNumber<std::int64_t>(text);
     if (!seed || *seed < 0) return "a whole number from 0";
     field = static_cast<std::uint64_t>(*seed);
   } else if (const auto number = parseFinite(text); allowed.expected) {
     if (!number || !allowed.in(1).hold(*number)) return allowed.expected;
-    if constexpr (std::is_same_v<Field, double>) {
+    if constexpr (std::is_same_v<Field, double> || std::is_same_v<Field, std::optional<double>>) {
       field = allowed.unit * *number;
     } else {
       field = durationFromSeconds(*number);
     }
-  } else if constexpr (!std::is_same_v<Field, double>) {  // a time, read exactly
+  } else if constexpr (std::is_same_v<Field,
+                                      std::optional<std::int64_t>>) {  // a time, read exactly
     const std::optional<std::int64_t> t_ns = parseSeconds(text);
     if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
       return "a time in seconds, within 4.6e9 s of 0";
@@ -42,7 +49,12 @@ const char* readFault(std::string_view text, const Allowed& allowed, Field& fiel
 /// Returns the value that `readFault` reads as this field, except for the rounding of degrees.
 template <typename Field>
 std::optional<OptionValue> valueOfFault(const Allowed& allowed, const Field& field) {
-  if constexpr (std::is_same_v<Field, std::optional<std::int64_t>>) {
+  if constexpr (std::is_same_v<Field, TrackerClass>) {
+    if (field == TrackerClass::kNone) return std::nullopt;
+    return std::string(nameOf(field));
+  } else if constexpr (std::is_same_v<Field, std::optional<double>>) {
+    return field ? valueOfFault(allowed, *field) : std::nullopt;
+  } else if constexpr (std::is_same_v<Field, std::optional<std::int64_t>>) {
     if (!field) return std::nullopt;
     if (!allowed.expected) return formatSeconds(*field);
     return valueOfFault(allowed, *field);

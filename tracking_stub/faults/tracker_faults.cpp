@@ -197,7 +197,11 @@ void TrackerFaults::validate() const {
 std::vector<StampedPose> withFaults(const std::vector<StampedPose>& poses,
                                     const TrackerFaults& faults) {
   faults.validate();
-  std::vector<StampedPose> kept = withoutLost(poses, faults.dropouts);
+  const PosePerturbationOptions& options = faults.perturbation;
+  std::vector<StampedPose> kept =
+      withoutLost(withTrackerProcess(poses, faults.process, options.max_pose_gap_s, options.tick_ns,
+                                     options.seed),
+                  faults.dropouts);
   if (!faults.perturbation.any()) return kept;
   Perturbation perturbation(faults.perturbation);
   for (const StampedPose& pose : kept) perturbation.add(pose);

@@ -9,6 +9,7 @@
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
+#include "tracking_stub/faults/tracker_process.h"
 
 namespace efm {
 
@@ -68,13 +69,15 @@ struct PoseDropoutOptions {
 
 /// All faults of a tracker. Default: none.
 struct TrackerFaults {
+  TrackerProcessOptions process;  ///< Comes before the other faults; its seed is theirs.
   PosePerturbationOptions perturbation;
   PoseDropoutOptions dropouts;
   std::int64_t latency_ns = 0;  ///< Time between a pose's stamp and its arrival.
 
+  /// Returns whether poses are moved.
+  bool move() const { return process.any() || perturbation.any(); }
   bool any() const {
-    return perturbation.any() || dropouts.drop_probability > 0 || dropouts.random_gaps_hz > 0 ||
-           latency_ns > 0;
+    return move() || dropouts.drop_probability > 0 || dropouts.random_gaps_hz > 0 || latency_ns > 0;
   }
   /// Visits the keys of `--perturb`, in metres, degrees and seconds. `tick_ns` has no key.
   template <typename Self, typename Visit>
@@ -101,6 +104,9 @@ struct TrackerFaults {
     visit("gaps_hz", self.dropouts.random_gaps_hz,
           Allowed::from(0, 1000, "a number, 0 to 1000 (gaps per second)"));
     visit("gap_s", self.dropouts.random_gap_s, seconds);
+    visit("tracker", self.process.tracker);
+    visit("depth_m", self.process.depth_m,
+          Allowed::from(0.01, 1e4, "a number, 0.01 to 1e4 (metres)"));
     visit("seed", poses.seed);  // seed of the dropouts, too
   }
   void validate() const;

@@ -297,8 +297,10 @@ std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool ro
 
 /// Applies the faults to the poses of each tracker. An inserted pose is a copy of the next pose,
 /// except for its time and T_world_body.
+/// @param T_body_rig replaces that of the samples, if set.
 std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFaults faults,
-                                   bool rounded) {
+                                   bool rounded, const std::optional<Rigid3>& T_body_rig,
+                                   const Rig& rig) {
   faults.perturbation.tick_ns = kTickNs;
   std::stable_sort(samples.begin(), samples.end(),
                    [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
@@ -311,13 +313,17 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
   for (const auto& [source, tracked] : trackers) {
     std::vector<StampedPose> poses;
     for (const PoseSample& sample : tracked) poses.push_back({sample.t_ns, sample.T_world_body});
+    faults.process.T_body_cam = T_body_rig.value_or(tracked.front().T_body_rig);
+    if (!rig.cameras.empty()) {
+      faults.process.T_body_cam = faults.process.T_body_cam * rig.cameras.front().T_rig_cam;
+    }
     auto next = tracked.begin();
     for (const StampedPose& pose : efm::withFaults(poses, faults)) {
       while (next->t_ns < pose.t_ns) ++next;  // lost, or used already
       PoseSample& sample = all.emplace_back(*next);
       if (next->t_ns == pose.t_ns) ++next;
       sample.t_ns = pose.t_ns;
-      if (!faults.perturbation.any() || !pose.T_world_rig.translation.allFinite()) continue;
+      if (!faults.move() || !pose.T_world_rig.translation.allFinite()) continue;
       sample.T_world_body = rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig;
     }
   }
@@ -326,18 +332,21 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
 
 /// Returns the poses of the given file, else the recording's own poses, with the faults.
 std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<StampedPose>& given,
-                                const RecordingSource& source, const RigSetup& setup) {
+                                const RecordingSource& source, const RigSetup& setup,
+                                const Rig& rig) {
   const bool replaced = !source.poses.empty();
   if (!replaced && parts.poses.empty() && parts.pose_samples.empty() && source.complete) {
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
   }
-  const bool moved = source.faults.perturbation.any();
+  const bool moved = source.faults.move();
   std::vector<PoseSample> samples = std::move(parts.pose_samples);
   if (replaced || samples.empty()) {
     samples = samplesOf(replaced ? given : parts.poses, source.rounded || moved);
   }
-  if (source.faults.any()) samples = withFaults(std::move(samples), source.faults, source.rounded);
+  if (source.faults.any()) {
+    samples = withFaults(std::move(samples), source.faults, source.rounded, setup.T_body_rig, rig);
+  }
   if (source.override_rig && setup.T_body_rig) {
     const Rigid3 T_body_rig =
         source.rounded ? roundedPose(setup.T_body_rig->inverse()).inverse() : *setup.T_body_rig;
@@ -395,7 +404,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
                                 source.packet_ns);
   }
-  joined.poses = posesOf(parts, poses, source, setup);
+  joined.poses = posesOf(parts, poses, source, setup, joined.rig);
   if (source.poses.empty()) joined.poses_damage = std::move(parts.poses_damage);
   if (!source.complete) joined.others = std::move(parts.others);
   joined.all_poses = source.complete;

@@ -29,6 +29,8 @@ const std::vector<std::string> kAll = {"noise_m=0.01",
                                        "drop=0.1",
                                        "gaps_hz=2",
                                        "gap_s=1e6",
+                                       "tracker=poor",
+                                       "depth_m=3.5",
                                        "seed=7"};
 
 TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
@@ -45,6 +47,8 @@ TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   EXPECT_EQ(faults.dropouts.drop_probability, 0.1);
   EXPECT_EQ(faults.dropouts.random_gaps_hz, 2);
   EXPECT_EQ(faults.dropouts.random_gap_s, 1e6);
+  EXPECT_EQ(faults.process.tracker, TrackerClass::kPoor);
+  EXPECT_EQ(faults.process.depth_m, 3.5);
   EXPECT_EQ(faults.perturbation.seed, 7U);
   EXPECT_EQ(faults.dropouts.seed, 7U);
   EXPECT_NO_THROW(faults.validate());
@@ -58,7 +62,7 @@ TEST(TrackerFaultKeys, ATimeMayBeAsFarAsClocksGo) {
 
 TEST(TrackerFaultKeys, AreListedWithValuesThatReadBack) {
   EXPECT_EQ(listTrackerFaults(faultsOf(kAll)).size(), kAll.size());
-  EXPECT_EQ(listTrackerFaults({}).size(), kAll.size() - 2) << "without what is not given";
+  EXPECT_EQ(listTrackerFaults({}).size(), kAll.size() - 4) << "without what is not given";
   for (const TrackerFaults& faults : {faultsOf(kAll), TrackerFaults{}}) {
     const auto list = listTrackerFaults(faults);
     TrackerFaults again;
@@ -75,6 +79,8 @@ TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
       {"keyframe_start_s=soon", "must be a time in seconds"},
       {"keyframe_start_s=4611686018.427387903", "within 4.6e9 s of 0"},  // half of the largest time
       {"keyframe_start_s=-4611686018.427387903", "within 4.6e9 s of 0"},
+      {"tracker=bad", "tracker = bad: must be good, typical, poor, car or none"},
+      {"depth_m=0", "depth_m = 0: must be a number, 0.01 to 1e4 (metres)"},
       {"seed=-2", "seed = -2: must be a whole number from 0"},
       {"seed=1.5", "seed = 1.5: must be a whole number from 0"},
   };
