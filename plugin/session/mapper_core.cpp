@@ -87,8 +87,9 @@ void MapperCore::addEvents(int camera, std::vector<Event> events) {
   {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
     if (index >= cameras_.size()) {
-      throw std::invalid_argument(fmt::format(
-          "events of camera {}: expected one of the {} added cameras", camera, cameras_.size()));
+      throw std::invalid_argument(
+          fmt::format("events of camera {}: there are {} cameras: expected addCamera before",
+                      camera, cameras_.size()));
     }
     packet.num_cameras = static_cast<int>(cameras_.size());
     if (!std::exchange(announced_, true)) announce(packet);
@@ -120,7 +121,7 @@ void MapperCore::announce(EventPacket packet) {
   if (error) std::rethrow_exception(error);
 }
 
-/// Returns why there is no keyframe. @return std::nullopt if there is one, or the input goes on.
+/// Returns why an ended input made no keyframe. @return std::nullopt if it made one.
 std::optional<Warning> MapperCore::noKeyframe(const SessionStatus& state,
                                               const FusionMapperOptions& options) const {
   if (state.counts.keyframes > 0) return std::nullopt;
