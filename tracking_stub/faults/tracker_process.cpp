@@ -8,6 +8,7 @@
 #include <string>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 
@@ -102,12 +103,6 @@ class LeakyWalk {
   Eigen::Vector3d value_ = Eigen::Vector3d::Zero();
 };
 
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Returns the median step in 0.2 s of the walk at a speed of 1.
 double stepOf(const Parameters& parameters, double dt_s) {
   LeakyWalk walk(parameters, dt_s, RandomNumbers(7));
@@ -121,7 +116,7 @@ double stepOf(const Parameters& parameters, double dt_s) {
   for (std::size_t i = lag; i < values.size(); ++i) {
     steps.push_back((values[i] - values[i - lag]).norm());
   }
-  return medianOf(std::move(steps));
+  return upperMedian(steps);
 }
 
 /// Returns the means over windows of `length` values around each value; the ends are repeated.
@@ -148,7 +143,7 @@ std::int64_t medianStepOf(const std::vector<StampedPose>& poses) {
   for (std::size_t i = 1; i < poses.size(); ++i) {
     steps_ns.push_back(static_cast<double>(poses[i].t_ns - poses[i - 1].t_ns));
   }
-  return static_cast<std::int64_t>(medianOf(std::move(steps_ns)));
+  return static_cast<std::int64_t>(upperMedian(steps_ns));
 }
 
 }  // namespace
@@ -163,11 +158,7 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
                                             std::uint64_t seed) {
   if (!options.any()) return poses;
   Trajectory truth(TrajectoryOptions{1e6});
-  Trajectory with_gaps(TrajectoryOptions{max_pose_gap_s});
-  for (const StampedPose& pose : poses) {
-    truth.add(pose);
-    with_gaps.add(pose);
-  }
+  for (const StampedPose& pose : poses) truth.add(pose);
   if (truth.poses().size() < 2) {
     throw std::invalid_argument("tracker = " + std::string(nameOf(options.tracker)) +
                                 ": expected at least two poses: there are " +
@@ -178,6 +169,7 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
   const std::int64_t dt_ns =
       std::max(tick_ns, (medianStepOf(truth.poses()) + tick_ns / 2) / tick_ns * tick_ns);
   const double dt_s = secondsBetween(0, dt_ns);
+  const std::int64_t max_gap_ns = durationFromSeconds(max_pose_gap_s);
   constexpr std::int64_t kMaxPoses = 50'000'000;  // 10 GB
   if ((last_ns - first_ns) / dt_ns > kMaxPoses) {
     throw std::invalid_argument("tracker = " + std::string(nameOf(options.tracker)) +
@@ -188,10 +180,16 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
   }
   const Parameters of = parametersOf(options.tracker);
 
+  // The errors go on in a gap, but the tracker has no poses there.
   std::vector<Rigid3> T_world_cam;
+  std::vector<bool> in_gap;
   std::size_t cursor = 0;
   for (std::int64_t t_ns = first_ns; t_ns <= last_ns; t_ns += dt_ns) {
-    T_world_cam.push_back(truth.segmentAt(t_ns, cursor)->poseAt(t_ns) * options.T_body_cam);
+    const auto segment = truth.segmentAt(t_ns, cursor);
+    T_world_cam.push_back(segment ? segment->poseAt(t_ns) * options.T_body_cam
+                                  : T_world_cam.back());
+    in_gap.push_back(!segment || (t_ns != segment->first.t_ns && t_ns != segment->last.t_ns &&
+                                  segment->last.t_ns - segment->first.t_ns > max_gap_ns));
   }
   const std::size_t count = T_world_cam.size();
   std::vector<Eigen::Vector3d> velocities_cam;  // of the camera, in its own frame
@@ -204,7 +202,8 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
     speeds.push_back(velocities_cam.back().norm());
   }
   speeds = smoothed(speeds, std::max<std::size_t>(1, static_cast<std::size_t>(0.5 / dt_s)));
-  const double usual_speed = medianOf(speeds);
+  std::vector<double> sorted = speeds;
+  const double usual_speed = upperMedian(sorted);
   for (double& speed : speeds) speed = std::max(speed, 0.2 * usual_speed);
 
   std::uint64_t stream = 0;
@@ -228,7 +227,6 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
   std::vector<StampedPose> moved;
   Eigen::Vector3d drift_world = Eigen::Vector3d::Zero();
   const Rigid3 T_cam_body = options.T_body_cam.inverse();
-  cursor = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Rigid3& T = T_world_cam[i];
     const double speed = speeds[i] * std::exp(of.burst_sigma * burst.next().x() -
@@ -248,7 +246,7 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
     rotation_rad += kRadiansPerDegree * (of.jitter_deg * normalVector(noise) +
                                          of.wander_deg / std::sqrt(3.0) * slow_turn.next());
     const std::int64_t t_ns = first_ns + static_cast<std::int64_t>(i) * dt_ns;
-    if (!with_gaps.segmentAt(t_ns, cursor)) continue;
+    if (in_gap[i]) continue;
     const Rigid3 T_moved = {(T.rotation * rotationBy(rotation_rad)).normalized(),
                             T.translation + drift_world + T.rotation * offset_cam};
     moved.push_back({t_ns, T_moved * T_cam_body});

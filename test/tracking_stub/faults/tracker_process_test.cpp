@@ -151,6 +151,11 @@ TEST(TrackerProcess, ResamplesAtTheMedianRateAndKeepsGaps) {
   EXPECT_THROW(moved({poses[0], later, still_later, hours_later}, TrackerClass::kGood, 1),
                std::invalid_argument)
       << "it would take all memory";
+  const StampedPose second = {poses[0].t_ns + 1'000'000'000, {}};
+  const StampedPose third = {poses[0].t_ns + 2'000'000'000, {}};
+  const StampedPose fourth = {poses[0].t_ns + 1'000'100'000'000'000, {}};
+  EXPECT_EQ(moved({poses[0], second, third, fourth}, TrackerClass::kGood, 1).size(), 4U)
+      << "a gap that no interpolation spans";
   EXPECT_THROW(moved({poses[0]}, TrackerClass::kGood, 1), std::invalid_argument);
   EXPECT_THROW(moved({poses[0], poses[0]}, TrackerClass::kGood, 1), std::invalid_argument);
 }
