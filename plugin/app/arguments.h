@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
+#include "plugin/playback/progress.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "tracking_stub/faults/tracker_faults.h"
 

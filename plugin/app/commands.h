@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "plugin/playback/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/playback/progress.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "tracking_stub/sensor/simulated_rig.h"

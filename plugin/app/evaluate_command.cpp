@@ -9,10 +9,10 @@
 
 #include "plugin/app/arguments.h"
 #include "plugin/app/commands.h"
-#include "plugin/playback/output_checks.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/playback/output_checks.h"
 #include "plugin/results/pictures/picture.h"
 
 namespace efm {

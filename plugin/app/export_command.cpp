@@ -12,9 +12,9 @@
 
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/playback/output_checks.h"
 #include "plugin/playback/progress.h"
-#include "plugin/app/recording_interval.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"

@@ -128,9 +128,7 @@ class Watchers {
   Watchers(const MapArguments& arguments, const MapJob& job) {
     if (arguments.view) all_.push_back(window_ = openWindow());
     if (arguments.record_frames.empty()) return;
-    std::vector<std::filesystem::path> inputs = inputsOf(job.sourceNow());
-    inputs.insert(inputs.end(), job.inputs.begin(), job.inputs.end());
-    rejectReplacing(arguments.record_frames, inputs);
+    rejectReplacing(arguments.record_frames, job.allInputs());
     all_.push_back(
         mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force));
   }

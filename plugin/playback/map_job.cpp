@@ -40,6 +40,12 @@ RecordingSource MapJob::sourceNow() const {
   return now;
 }
 
+std::vector<std::filesystem::path> MapJob::allInputs() const {
+  std::vector<std::filesystem::path> all = inputsOf(sourceNow());
+  all.insert(all.end(), inputs.begin(), inputs.end());
+  return all;
+}
+
 void MapJob::prepare() {
   if (!source.calibration.empty()) options.rig.calibration = source.calibration;
   if (!source.poses.empty()) options.rig.pose_source.clear();  // a single source
@@ -124,9 +130,7 @@ std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
 /// the same kind is probably a mistake.
 void rejectOutputFolder(const MapJob& job, OutputKind kind) {
   const std::filesystem::path& folder = job.out;
-  std::vector<std::filesystem::path> inputs = inputsOf(job.sourceNow());
-  inputs.insert(inputs.end(), job.inputs.begin(), job.inputs.end());
-  rejectReplacing(folder, inputs);
+  rejectReplacing(folder, job.allInputs());
   std::error_code ignored;
   if (job.force || !std::filesystem::is_directory(folder, ignored)) return;
   if (std::filesystem::is_empty(folder)) return;
@@ -517,15 +521,9 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options,
                     const Overrides& overrides) {
   MapJob job;
-  job.source.files = files;
-  job.source.poses = overrides.poses;
-  job.source.calibration = overrides.calibration;
-  job.source.hand_eye = overrides.hand_eye;
-  job.source.calibration_given = "calibration";
-  job.source.hand_eye_given = "hand_eye";
+  job.source = sourceOf(files, overrides);
   job.options = options.values();
   job.options.mapper.limits = overrides.limits;
-  job.options.mapper.limits.validate();
   job.out = out;
   job.prepare();
   MapResult result = mapInto(std::move(job));

@@ -42,6 +42,8 @@ struct MapJob {
   /// Returns the recording for the options so far: the stride may be chosen later. It is the length
   /// of tracker noise that is constant over a keyframe.
   RecordingSource sourceNow() const;
+  /// Returns all files that the job reads.
+  std::vector<std::filesystem::path> allInputs() const;
   /// Takes the overrides of the source into the options, and reads calibration and hand-eye
   /// transform once.
   void prepare();

@@ -31,6 +31,13 @@ EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const R
   return options;
 }
 
+/// Returns why an ended input made no keyframe. @return std::nullopt if it made one.
+std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapperOptions& options) {
+  if (state.counts.keyframes > 0) return std::nullopt;
+  return Warning{"no-keyframe",
+                 fmt::format("there is no keyframe: {}", whyNoKeyframe(state, options).what())};
+}
+
 }  // namespace
 
 MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
@@ -119,14 +126,6 @@ void MapperCore::announce(EventPacket packet) {
   std::exception_ptr error;
   if (!queue_) feed(std::move(batch), error);
   if (error) std::rethrow_exception(error);
-}
-
-/// Returns why an ended input made no keyframe. @return std::nullopt if it made one.
-std::optional<Warning> MapperCore::noKeyframe(const SessionStatus& state,
-                                              const FusionMapperOptions& options) const {
-  if (state.counts.keyframes > 0) return std::nullopt;
-  return Warning{"no-keyframe",
-                 fmt::format("there is no keyframe: {}", whyNoKeyframe(state, options).what())};
 }
 
 std::vector<Warning> MapperCore::warnings() const {

@@ -87,8 +87,6 @@ class MapperCore {
 
   // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
   FusionMapperOptions usedOptions() const;
-  std::optional<Warning> noKeyframe(const SessionStatus& state,
-                                    const FusionMapperOptions& options) const;
   void noteEnd(std::exception_ptr& error);
   void workHere(Batch batch);
   void announce(EventPacket packet);

@@ -427,16 +427,24 @@ std::vector<TruthDepth> openTruth(const RecordingSource& source) {
 
 std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path>& files,
                                          const Overrides& overrides) {
+  return openRecording(sourceOf(files, overrides));
+}
+
+RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
+                         const Overrides& overrides) {
   overrides.limits.validate();
+  const auto given = [](const char* name, const Path& file) {
+    return file.empty() ? std::string() : name + (" " + file.string());
+  };
   RecordingSource source;
   source.files = files;
   source.poses = overrides.poses;
   source.calibration = overrides.calibration;
   source.hand_eye = overrides.hand_eye;
-  source.calibration_given = "calibration";
-  source.hand_eye_given = "hand_eye";
+  source.calibration_given = given("calibration", overrides.calibration);
+  source.hand_eye_given = given("hand_eye", overrides.hand_eye);
   source.limits = overrides.limits;
-  return openRecording(source);
+  return source;
 }
 
 }  // namespace efm

@@ -59,6 +59,12 @@ std::vector<std::string> recordingFormats();
 /// are put together in the order of the files.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
+struct Overrides;  // event_fusion/engine.h
+
+/// Returns the recording of a program that gives files and overrides.
+RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
+                         const Overrides& overrides);
+
 /// Returns the depth maps of the recording's truth, for formats with `RecordingFormat::truth`.
 /// Opens no events.
 std::vector<TruthDepth> openTruth(const RecordingSource& source);

@@ -134,6 +134,15 @@ TEST_F(MapCommand, MapRecordingMakesTheSameFilesAndReportsTheSameErrors) {
   EXPECT_EQ(report.points, reportIn("out")["points"]);
   EXPECT_EQ(json::parse(report.json)["options"], reportIn("out")["options"]);
 
+  // A missing file is named.
+  Overrides missing;
+  missing.calibration = "none.yaml";
+  for (const std::string& text :
+       {messageOf([&] { openRecording({folder() / "data"}, missing); }),
+        messageOf([&] { mapRecording({folder() / "data"}, folder() / "x", {}, missing); })}) {
+    EXPECT_EQ(text, "calibration none.yaml: no such file");
+  }
+
   // Damage: what comes before it is mapped, then the error is thrown.
   std::ofstream(folder() / "data/cam0/events.txt", std::ios::app) << "damage\n";
   const Result damaged = run("map rig.ini data --out out");
