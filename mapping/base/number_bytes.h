@@ -35,6 +35,13 @@ void writeLittleEndian(std::ostream& stream, Number number) {
   stream.write(reinterpret_cast<const char*>(&ordered), sizeof(Number));
 }
 
+/// Appends a number with its lowest byte first, on any machine.
+template <typename Number>
+void appendLittleEndian(std::string& bytes, Number number) {
+  const auto ordered = numberFrom<Number>(&number, false);
+  bytes.append(reinterpret_cast<const char*>(&ordered), sizeof(Number));
+}
+
 /// The types of numbers in files.
 enum class NumberType {
   kInt8,

@@ -144,15 +144,11 @@ Record takeMcapFields(ByteReader& content) {
 /// Appends numbers, and texts after their size.
 template <typename... Fields>
 void appendMcapFields(std::string& bytes, const Fields&... fields) {
-  const auto append_number = [&bytes](auto number) {
-    const auto ordered = numberFrom<decltype(number)>(&number, false);
-    bytes.append(reinterpret_cast<const char*>(&ordered), sizeof(ordered));
-  };
   const auto append = [&](const auto& field) {
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(field)>>) {
-      append_number(field);
+      appendLittleEndian(bytes, field);
     } else {
-      append_number(static_cast<std::uint32_t>(field.size()));
+      appendLittleEndian(bytes, static_cast<std::uint32_t>(field.size()));
       bytes.append(field);
     }
   };

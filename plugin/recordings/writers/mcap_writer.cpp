@@ -11,18 +11,13 @@
 #include <string_view>
 #include <type_traits>
 
+#include "mapping/base/number_bytes.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/mcap_records.h"
 #include "plugin/recordings/writers/recording_writer.h"
 
 namespace efm {
 namespace {
-
-template <typename Number>
-void appendNumber(std::string& bytes, Number value) {
-  static_assert(std::is_arithmetic_v<Number>);
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof(Number));  // little-endian machines
-}
 
 /// Writes a ROS 2 message in CDR: after 4 bytes of header, values are at multiples of their size.
 class CdrWriter {
@@ -45,7 +40,7 @@ class CdrWriter {
   void addOne(Number value) {
     const std::size_t over = (bytes_.size() - kHeader) % sizeof(Number);
     if (over > 0) bytes_.append(sizeof(Number) - over, '\0');
-    appendNumber(bytes_, value);
+    appendLittleEndian(bytes_, value);
   }
 
   static constexpr std::size_t kHeader = 4;
@@ -161,7 +156,7 @@ class McapWriter : public RecordingWriter {
     McapFooter footer = {position_};
     appendMcapRecord(summary, footer);
     summary.resize(summary.size() - sizeof(footer.checksum));
-    appendNumber(summary, checksumOf(summary));
+    appendLittleEndian(summary, checksumOf(summary));
     write(summary.append(kMcapMagic));
     output_.close();
     file_.replace();
@@ -228,10 +223,10 @@ class McapWriter : public RecordingWriter {
         throw std::runtime_error(fmt::format("{}: y = {}: expected at most {} in encoding mono",
                                              file_.path().string(), event->y, kMaxRow));
       }
-      appendNumber(packet.bytes(), static_cast<std::uint64_t>(event->t_ns - t_ns) |
-                                       std::uint64_t{event->x} << 32 |
-                                       std::uint64_t{event->y} << 48 |
-                                       static_cast<std::uint64_t>(event->polarity) << 63);
+      appendLittleEndian(packet.bytes(), static_cast<std::uint64_t>(event->t_ns - t_ns) |
+                                             std::uint64_t{event->x} << 32 |
+                                             std::uint64_t{event->y} << 48 |
+                                             static_cast<std::uint64_t>(event->polarity) << 63);
     }
     addMessage(eventsChannel(camera), t_ns, packet.bytes());
   }
