@@ -18,7 +18,7 @@
 
 /// @mainpage
 /// The engine of event-fusion-mapper: events of calibrated cameras and poses of a tracker in,
-/// keyframe depth maps and one point cloud out. A program needs this header alone:
+/// keyframe depth maps and one point cloud out. A program needs event_fusion/engine.h alone:
 ///
 /// - efm::Mapper maps cameras, events and poses that a program has (`addCamera`, `addEvents`,
 ///   `addPose`), or the samples of a recording; while they come, or beside a sensor.
