@@ -63,11 +63,14 @@ std::vector<Event> chosenEvenly(EventSpan events, std::size_t limit) {
   return chosen;
 }
 
+std::size_t EventSpan::indexOf(std::int64_t t_ns) const {
+  const Event* first = std::lower_bound(
+      begin_, end_, t_ns, [](const Event& event, std::int64_t time) { return event.t_ns < time; });
+  return static_cast<std::size_t>(first - begin_);
+}
+
 std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
-  const auto first =
-      std::lower_bound(events.begin() + static_cast<std::ptrdiff_t>(begin), events.end(), t_ns,
-                       [](const Event& event, std::int64_t time) { return event.t_ns < time; });
-  return static_cast<std::size_t>(first - events.begin());
+  return begin + EventSpan(events).part(begin, events.size()).indexOf(t_ns);
 }
 
 std::uint64_t EventBuffer::insert(EventSpan added) {

@@ -36,6 +36,12 @@ class EventSpan {
   std::size_t size() const { return static_cast<std::size_t>(end_ - begin_); }
   bool empty() const { return begin_ == end_; }
   const Event& operator[](std::size_t i) const { return begin_[i]; }
+  /// Returns the index of the first event at or after a time.
+  std::size_t indexOf(std::int64_t t_ns) const;
+  /// Returns the events of [t0, t1).
+  EventSpan between(std::int64_t t0_ns, std::int64_t t1_ns) const {
+    return part(indexOf(t0_ns), indexOf(t1_ns));
+  }
   /// Returns the events [first, last) of this span.
   EventSpan part(std::size_t first, std::size_t last) const {
     return {begin_ + first, begin_ + last};

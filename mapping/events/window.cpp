@@ -38,13 +38,6 @@ void shuffleWith(std::mt19937& random, std::vector<int>& items) {
   }
 }
 
-std::size_t firstAtOrAfter(EventSpan events, std::int64_t t_ns) {
-  const Event* first =
-      std::lower_bound(events.begin(), events.end(), t_ns,
-                       [](const Event& event, std::int64_t time) { return event.t_ns < time; });
-  return static_cast<std::size_t>(first - events.begin());
-}
-
 }  // namespace
 
 std::string_view nameOf(SubintervalSplit split) { return nameIn(kSplits, split); }
@@ -69,7 +62,7 @@ std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_n
       end = events.size() / count * s + events.size() % count * s / count;
     } else if (s < count) {
       const auto steps = static_cast<std::int64_t>(s);
-      end = firstAtOrAfter(events, t0_ns + quotient_ns * steps + rest_ns * steps / options.count);
+      end = events.indexOf(t0_ns + quotient_ns * steps + rest_ns * steps / options.count);
     }
     parts.push_back(events.part(begin, end));
     begin = end;

@@ -13,6 +13,8 @@ inline constexpr double kPi = 3.14159265358979323846;
 /// Angles are in radians everywhere, except in files and option keys (`_deg`).
 inline constexpr double kRadiansPerDegree = kPi / 180;
 
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
 /// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
 /// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
 ///

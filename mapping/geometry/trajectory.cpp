@@ -117,24 +117,15 @@ std::optional<TrajectorySegment> Trajectory::segmentAt(std::int64_t t_ns,
   return std::nullopt;
 }
 
-Rigid3 VelocityCorrection::displacement(double since_s) const {
-  const Eigen::Vector3d rotation = since_s * angular_rad_s;
-  const Eigen::Vector3d path = since_s * linear_m_s;
-  const double angle = rotation.norm();
-  constexpr double kSmallAngle = 1e-4;  // below it the series is exact to rounding
-  const double square = angle * angle;
-  const bool small = angle < kSmallAngle;
-  const double sine = small ? 1 - square / 6 : std::sin(angle) / angle;
-  const double cosine = small ? 0.5 - square / 24 : (1 - std::cos(angle)) / square;
-  const double rest = small ? 1.0 / 6 - square / 120 : (1 - sine) / square;
-  Rigid3 T_rig_true;
-  const double half = small ? 0.5 - square / 48 : std::sin(angle / 2) / angle;
-  T_rig_true.rotation.w() = std::cos(angle / 2);
-  T_rig_true.rotation.vec() = half * rotation;
-  T_rig_true.rotation.normalize();
-  T_rig_true.translation =
-      sine * path + cosine * rotation.cross(path) + rest * rotation.dot(path) * rotation;
-  return T_rig_true;
+Rigid3 MotionCorrection::displacement(double since_s) const {
+  if (knots.empty()) return {};
+  const auto last = static_cast<double>(knots.size() - 1);
+  const double at = std::clamp(since_s / spacing_s + static_cast<double>(reference), 0.0, last);
+  const auto before = static_cast<std::size_t>(at);
+  const std::size_t after = std::min(before + 1, knots.size() - 1);
+  const double along = at - static_cast<double>(before);
+  const Vector6d motion = (1 - along) * knots[before] + along * knots[after];
+  return {rotationBy(motion.tail<3>()), motion.head<3>()};
 }
 
 CameraMotion::CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref_world,

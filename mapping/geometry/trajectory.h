@@ -92,15 +92,20 @@ class Trajectory {
   std::vector<StampedPose> poses_;  // strictly increasing times
 };
 
-/// The tracker's velocity error, constant within one window, in the rig's frame:
-/// T_world_true(t) = T_world_rig(t) * displacement(t - t_ref). The pose at the reference time
-/// stays, so the keyframe keeps its pose.
-struct VelocityCorrection {
-  Eigen::Vector3d linear_m_s = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
+/// The tracker's motion error within one window, in the rig's frame:
+/// T_world_true(t) = T_world_rig(t) * displacement(t - t_ref). It is linear between knots at equal
+/// times. The knot at the reference time stays 0, so the keyframe keeps its pose.
+struct MotionCorrection {
+  double spacing_s = 0;       ///< Between two knots.
+  std::size_t reference = 0;  ///< Index of the knot at the reference time.
+  /// Small motions: translation in metres, then a rotation vector in radians. None: no correction.
+  std::vector<Vector6d> knots;
 
-  /// Returns T_rig_true at a time after (negative: before) the reference time: the exponential map
-  /// of SE(3), a screw motion.
+  /// Returns the time of a knot after (negative: before) the reference time.
+  double sinceReference(std::size_t knot) const {
+    return spacing_s * (static_cast<double>(knot) - static_cast<double>(reference));
+  }
+  /// Returns T_rig_true, interpolated; beyond the knots it is that of the nearest one.
   Rigid3 displacement(double since_s) const;
 };
 

@@ -49,7 +49,7 @@ struct KeyframeDepthMap {
   double parallax_px_m = 0;
   double max_confidence = 0;  ///< Maximum over all pixels, with depth or without.
   /// Correction of the tracker's motion in the window, if one was found.
-  std::optional<VelocityCorrection> motion_correction;
+  std::optional<MotionCorrection> motion_correction;
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;

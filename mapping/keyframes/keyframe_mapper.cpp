@@ -72,28 +72,38 @@ double sharpnessOf(const KeyframeDepthMap& keyframe) {
 
 }  // namespace
 
-KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along) {
+KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along,
+                              const AlignMotion& align) {
   const MotionCorrectionOptions& options = window.options;
-  KeyframeDepthMap keyframe = map_along(window.tracked, nullptr);
+  const WindowInput& input = window.input;
+  KeyframeDepthMap keyframe = map_along(input, window.tracked, nullptr);
+  // Near the reference time the tracker's errors are small: this depth has a right scale.
+  constexpr double kCentral = 0.2;
+  const CentralPart central(input, kCentral);
+  const WindowInput central_input{central.window, central.cameras, input.view, input.planes,
+                                  input.T_world_ref};
+  cv::Mat1f depth = map_along(central_input, window.tracked, nullptr).map.depth;
   Trajectory motion = window.tracked;
   for (int round = 0; round < options.motion_rounds; ++round) {
-    const VelocityCorrection current = keyframe.motion_correction.value_or(VelocityCorrection{});
-    VelocityCorrection correction;
+    std::optional<AlignedMotion> aligned;
     {
       const StageScope scope(window.stages, Stage::kSweep);
-      correction = findCorrection(window.input, motion, keyframe.map.depth, current, options);
+      aligned = align(depth, keyframe.motion_correction);
     }
-    Trajectory corrected = correctedTrajectory(window.tracked, window.input.window, correction);
-    KeyframeDepthMap sharper = map_along(corrected, nullptr);
+    constexpr double kSameMotionPx = 0.25;  // does not blur the DSI
+    if (!aligned || aligned->shift_px < kSameMotionPx) break;
+    Trajectory corrected = correctedTrajectory(window.tracked, input.window, aligned->correction);
+    KeyframeDepthMap sharper = map_along(input, corrected, nullptr);
     const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
     if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(keyframe))) break;
     motion = std::move(corrected);
     keyframe = std::move(sharper);
-    keyframe.motion_correction = correction;
+    keyframe.motion_correction = aligned->correction;
+    depth = keyframe.map.depth;
   }
   if (window.sink == nullptr) return keyframe;
-  const std::optional<VelocityCorrection> correction = keyframe.motion_correction;
-  keyframe = map_along(motion, window.sink);
+  const std::optional<MotionCorrection> correction = keyframe.motion_correction;
+  keyframe = map_along(input, motion, window.sink);
   keyframe.motion_correction = correction;
   return keyframe;
 }
@@ -179,12 +189,17 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   const WindowInput input{window, cameras, view_, planes_, referencePose(*T_world_rig)};
   // 3-5. From events to depth.
   tbb::task_arena arena(options_.sweep.threadsOrCores());
-  const auto map_along = [&](const Trajectory& motion, DsiSink* dsi) {
-    return mapAlong(input, motion, dsi, stages);
+  const auto map_along = [&](const WindowInput& part, const Trajectory& motion, DsiSink* dsi) {
+    return mapAlong(part, motion, dsi, stages);
   };
   KeyframeDepthMap keyframe = arena.execute([&] {
-    if (!options_.motion.correct_motion) return map_along(trajectory, sink);
-    return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along);
+    if (!options_.motion.correct_motion) return map_along(input, trajectory, sink);
+    std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
+    const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
+      if (!slices) slices.emplace(input, trajectory, options_.motion);
+      return slices->align(depth, start.value_or(slices->none()));
+    };
+    return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along, align);
   });
 
   keyframe.over_budget = over_budget;
@@ -220,8 +235,6 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   keyframe.window = input.window;
   keyframe.T_world_ref = input.T_world_ref;
   keyframe.view = view_;
-  const auto seen = motionIn({input.window, {}, &motion}, rig_, selected_, options_);
-  if (seen) keyframe.parallax_px_m = seen->parallax_px_m;
   keyframe.events.resize(rig_.cameras.size());
   std::vector<WindowRays> cameras(input.cameras.size());
   {
@@ -233,6 +246,10 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
     countEvents(cameras, keyframe);
     if (options_.exclude_silent) removeSilent(cameras);
   }
+  std::vector<int> fused;
+  for (const WindowRays& camera : cameras) fused.push_back(camera.camera);
+  const auto seen = motionIn({input.window, {}, &motion}, rig_, fused, options_);
+  if (seen) keyframe.parallax_px_m = seen->parallax_px_m;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);  // apart from the rays, for benchmarks

@@ -13,6 +13,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/motion/motion_correction.h"
+#include "mapping/motion/slice_alignment.h"
 #include "mapping/rays/rays.h"
 #include "mapping/sweep/space_sweep.h"
 
@@ -77,13 +78,20 @@ struct CorrectedWindow {
   StageHook* stages = nullptr;  ///< May be null.
 };
 
-/// Maps the window along a motion; the sink may be null.
-using MapAlong = std::function<KeyframeDepthMap(const Trajectory& motion, DsiSink* sink)>;
+/// Maps a window or a part of it along a motion; the sink may be null.
+using MapAlong =
+    std::function<KeyframeDepthMap(const WindowInput&, const Trajectory& motion, DsiSink* sink)>;
+
+/// Finds the motion from a depth: see SliceAlignment::align. Without a start, it is the tracker's.
+using AlignMotion = std::function<std::optional<AlignedMotion>(
+    const cv::Mat1f& depth, const std::optional<MotionCorrection>& start)>;
 
 /// Maps the window along the tracker's motion, then finds the correction of the motion from the
-/// depth and maps again along the corrected motion, while the fused DSI becomes sharper.
+/// depth and maps again along the corrected motion, while the fused DSI becomes sharper. The first
+/// correction is from the depth of the window's central part.
 /// @return the sharpest keyframe, with its correction if there is one.
-KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along);
+KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along,
+                              const AlignMotion& align);
 
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;

@@ -188,10 +188,7 @@ class PacketSplitter {
 /// segment's end is in the next segment, but an event at the last pose is in the last segment.
 std::size_t endOfSegment(EventSpan events, std::size_t begin, const TrajectorySegment& segment) {
   const std::int64_t end_ns = std::max(segment.last.t_ns, events[begin].t_ns + 1);
-  const Event* end =
-      std::lower_bound(events.begin() + begin, events.end(), end_ns,
-                       [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; });
-  return static_cast<std::size_t>(end - events.begin());
+  return begin + events.part(begin, events.size()).indexOf(end_ns);
 }
 
 }  // namespace

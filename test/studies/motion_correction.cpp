@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "mapping/motion/event_contrast.h"
+#include "mapping/motion/motion_correction.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/method_comparison.h"
@@ -60,8 +60,6 @@ struct Outcome {
   double seconds = 0;
   int keyframes = 0;
   int corrected = 0;
-  double left_deg_s = 0;  ///< Sum of the remaining velocity errors.
-  double left_cm_s = 0;
 
   double median() const {
     std::vector<double> sorted = errors;
@@ -82,9 +80,8 @@ struct Outcomes {
 };
 
 /// Maps a window and adds the result to the outcome.
-/// @param wrong the velocity error that the correction should find.
 void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
-             const KeyframeMapperOptions& options, const VelocityCorrection& wrong) {
+             const KeyframeMapperOptions& options) {
   KeyframeMapper mapper(recording.simulation.rig, {0, 1}, options);
   const auto began = std::chrono::steady_clock::now();
   const KeyframeDepthMap keyframe =
@@ -93,9 +90,6 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
       std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   ++outcome.keyframes;
   outcome.corrected += keyframe.motion_correction ? 1 : 0;
-  const VelocityCorrection found = keyframe.motion_correction.value_or(VelocityCorrection{});
-  outcome.left_cm_s += 100 * (found.linear_m_s - wrong.linear_m_s).norm();
-  outcome.left_deg_s += (found.angular_rad_s - wrong.angular_rad_s).norm() / kRadiansPerDegree;
   const auto pairs = pairDepths({keyframe.map.depth, truthOf(recording, keyframe)}, studyPairing());
   for (const DepthPair& pair : pairs) {
     outcome.errors.push_back(std::abs(pair.estimate_m - pair.truth_m) / pair.truth_m);
@@ -109,14 +103,17 @@ void mapWindows(Outcomes& outcomes, const Recording& recording, const TrackerErr
   Recording wrong = error.sway ? withPoseSway(recording, *error.sway) : recording;
   RandomNumbers random(recording.simulation.seed);
   for (const Window& window : windows) {
-    const VelocityCorrection to_find{0.01 * error.velocity * direction(random),
-                                     kRadiansPerDegree * error.velocity * direction(random)};
     if (error.velocity > 0) {
-      wrong.trajectory = correctedTrajectory(recording.trajectory, window,
-                                             {-to_find.linear_m_s, -to_find.angular_rad_s});
+      Vector6d per_s;
+      per_s << 0.01 * direction(random), kRadiansPerDegree * direction(random);
+      MotionCorrection steady = knotsOf(window, 0.01);
+      for (std::size_t i = 0; i < steady.knots.size(); ++i) {
+        steady.knots[i] = error.velocity * steady.sinceReference(i) * per_s;
+      }
+      wrong.trajectory = correctedTrajectory(recording.trajectory, window, steady);
     }
-    mapInto(outcomes.as_is, wrong, window, options, to_find);
-    mapInto(outcomes.corrected, wrong, window, correcting, to_find);
+    mapInto(outcomes.as_is, wrong, window, options);
+    mapInto(outcomes.corrected, wrong, window, correcting);
   }
 }
 
@@ -147,14 +144,10 @@ void addRows(TextTable& table, const Case& what, const std::vector<TrackerError>
     for (const bool corrected : {false, true}) {
       const Outcome& outcome = corrected ? all[i].corrected : all[i].as_is;
       const double keyframes = outcome.keyframes;
-      const std::string left = errors[i].sway
-                                   ? "-"
-                                   : formatNumber(outcome.left_cm_s / keyframes, 1) + ", " +
-                                         formatNumber(outcome.left_deg_s / keyframes, 1);
       table.rows.push_back(
           {i == 0 && !corrected ? what.preset : "", corrected ? "" : errors[i].name,
            corrected ? "corrected" : "as they are",
-           std::to_string(outcome.corrected) + " of " + std::to_string(outcome.keyframes), left,
+           std::to_string(outcome.corrected) + " of " + std::to_string(outcome.keyframes),
            std::to_string(outcome.errors.size()), formatNumber(100 * outcome.median(), 2),
            formatNumber(100 * outcome.beyond10(), 2),
            formatNumber(outcome.seconds / keyframes, 2)});
@@ -215,17 +208,16 @@ void studyMotionCorrection(const StudyRun& run, StudySection& section) {
   const MotionCorrectionOptions defaults;
   section.text(
       "The paper uses its fused DSI as a measure of refocused events (Sec. 3.4.2) and does not "
-      "change poses. Here a constant velocity corrects the motion within a window: it maximizes "
-      "the contrast of the events (`[refinement] correct_motion`, " +
+      "change poses. Here the motion within a window is corrected: slices of 10 ms of events are "
+      "aligned with the points of the depth map (`[refinement] correct_motion`, up to " +
       std::to_string(defaults.motion_rounds) +
       " rounds). The pose at the reference time does not change. The tracker has a velocity error "
       "with a random direction in each window, or sways around the truth once a second. Three "
       "windows each (0.2 s of `desk_stereo`, 0.3 s of `room_stereo`) of seeds 1 to 3, all points "
-      "together; two cameras, the default depth. *Left*: the mean remaining velocity error in cm/s "
-      "and °/s; *time*: seconds per keyframe, on this machine.");
+      "together; two cameras, the default depth. *Time*: seconds per keyframe, on this machine.");
   const std::vector<TrackerError> errors = trackerErrors(run.quick);
   TextTable table;
-  table.head = {"recording", "tracker",    "poses",           "corrected", "left [cm/s, °/s]",
+  table.head = {"recording", "tracker",    "poses",           "corrected",
                 "points",    "median [%]", "beyond 10 % [%]", "time [s]"};
   std::vector<std::vector<Outcomes>> all;
   std::vector<cv::Mat> plots;

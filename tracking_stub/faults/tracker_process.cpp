@@ -24,6 +24,9 @@ constexpr NamedChoice<TrackerClass> kClasses[] = {{TrackerClass::kNone, "none"},
 /// The time in which the size of errors is stated: the step of the random walk, and travel.
 constexpr double kStepS = 0.2;
 constexpr double kDefaultDepthM = 2;
+/// The parameters were fitted to trackers with about 100 poses a second. Noise of each pose would
+/// be something else at a higher rate.
+constexpr std::int64_t kMinStepNs = 10'000'000;
 
 /// Parameters of a class. Errors of the position are fractions of the speed, or of the travel in
 /// 0.2 s; times are seconds.
@@ -167,7 +170,8 @@ std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& pose
   const std::int64_t first_ns = truth.poses().front().t_ns;
   const std::int64_t last_ns = truth.poses().back().t_ns;
   const std::int64_t dt_ns =
-      std::max(tick_ns, (medianStepOf(truth.poses()) + tick_ns / 2) / tick_ns * tick_ns);
+      std::max(tick_ns, (std::max(kMinStepNs, medianStepOf(truth.poses())) + tick_ns / 2) /
+                            tick_ns * tick_ns);
   const double dt_s = secondsBetween(0, dt_ns);
   const std::int64_t max_gap_ns = durationFromSeconds(max_pose_gap_s);
   constexpr std::int64_t kMaxPoses = 50'000'000;  // 10 GB

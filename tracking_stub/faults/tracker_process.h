@@ -35,7 +35,7 @@ struct TrackerProcessOptions {
 };
 
 /// Returns the poses of a tracker that makes the errors of real event-based trackers, resampled at
-/// their median rate. Gaps stay.
+/// their median rate, but at most 100 times a second. Gaps stay.
 ///
 /// The error of the camera's position is a random walk that leaks back to 0, as a tracker returns
 /// to its own map: de/dt = u - e / tau. Its velocity u is in proportion to the camera's speed, and

@@ -263,25 +263,28 @@ struct NoSink : DsiSink {
 TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
   const struct {
     const char* what;
-    std::vector<double> sharpness;  // per keyframe; the first has the tracked motion
+    std::vector<double> sharpness;  // per whole keyframe; the first has the tracked motion
     int rounds;
     double min_gain;
     bool with_sink;
-    int taken;  // index of the selected keyframe
-    int mapped;
+    int taken;    // index of the selected keyframe
+    int aligned;  // times
+    double shift_px = 1;
   } cases[] = {
-      {"too little", {1, 1.09, 5}, 3, 0.1, false, 0, 2},
-      {"enough, then less", {1, 1.11, 1.1, 5}, 3, 0.1, false, 1, 3},
-      {"after the first any gain is enough", {1, 1.11, 1.12, 1.13, 5}, 3, 0.1, false, 3, 4},
-      {"rounds", {1, 2, 3, 4}, 2, 0.1, false, 2, 3},
-      {"nothing is sharp", {0, 0, 5}, 3, 0, false, 0, 2},
-      {"the sink has the one that is taken", {1, 2, 1.5, 2}, 3, 0.1, true, 1, 4},
-      {"the sink has the tracked one", {2, 1, 2}, 3, 0.1, true, 0, 3},
+      {"too little", {1, 1.09, 5}, 3, 0.1, false, 0, 1},
+      {"enough, then less", {1, 1.11, 1.1, 5}, 3, 0.1, false, 1, 2},
+      {"after the first any gain is enough", {1, 1.11, 1.12, 1.13, 5}, 3, 0.1, false, 3, 3},
+      {"rounds", {1, 2, 3, 4}, 2, 0.1, false, 2, 2},
+      {"nothing is sharp", {0, 0, 5}, 3, 0, false, 0, 1},
+      {"the same motion", {1, 5}, 3, 0, false, 0, 1, 0.1},
+      {"the sink has the one that is taken", {1, 2, 1.5, 2}, 3, 0.1, true, 1, 2},
+      {"the sink has the tracked one", {2, 1, 2}, 3, 0.1, true, 0, 1},
   };
   const test::RandomRecording recording(1, 1, 10);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
   const DepthPlanes planes;
-  const std::vector<CameraEvents> no_cameras;  // without cameras there is no correction
+  const std::vector<CameraEvents> no_cameras;
+  const Window& window = test::RandomRecording::kWindow;
   for (const auto& c : cases) {
     SCOPED_TRACE(c.what);
     MotionCorrectionOptions options;
@@ -289,10 +292,15 @@ TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
     options.min_gain = c.min_gain;
     NoSink sink;
     std::vector<const DsiSink*> sinks;
-    std::vector<std::size_t> poses;  // a corrected motion has a pose at the reference
-    const auto map_along = [&](const Trajectory& motion, DsiSink* to) {
+    std::vector<std::size_t> poses;  // a corrected motion has poses at its knots
+    std::vector<float> aligned_to;   // depths
+    const auto map_along = [&](const WindowInput& input, const Trajectory& motion, DsiSink* to) {
       KeyframeDepthMap keyframe;
-      keyframe.map.depth = cv::Mat1f::zeros(36, 48);
+      const bool whole = input.window.t0_ns == window.t0_ns;
+      EXPECT_NEAR(static_cast<double>(input.window.t1_ns - input.window.t0_ns),
+                  (whole ? 1 : 0.2) * static_cast<double>(window.t1_ns - window.t0_ns), 2);
+      keyframe.map.depth = cv::Mat1f(1, 1, whole ? static_cast<float>(sinks.size() + 1) : 0.5F);
+      if (!whole) return keyframe;
       const double value = std::sqrt(c.sharpness.at(sinks.size()));
       keyframe.map.confidence = cv::Mat1f(1, 1, static_cast<float>(value));
       keyframe.without_pose = sinks.size();
@@ -300,13 +308,21 @@ TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
       poses.push_back(motion.poses().size());
       return keyframe;
     };
-    const KeyframeDepthMap keyframe =
-        mapCorrected({{test::RandomRecording::kWindow, no_cameras, view, planes, {}},
-                      recording.trajectory,
-                      options,
-                      c.with_sink ? &sink : nullptr},
-                     map_along);
-    ASSERT_EQ(sinks.size(), static_cast<std::size_t>(c.mapped));
+    const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
+      EXPECT_EQ(start.has_value(), !aligned_to.empty());
+      aligned_to.push_back(depth(0, 0));
+      return AlignedMotion{knotsOf(window, 0.003), c.shift_px};
+    };
+    const KeyframeDepthMap keyframe = mapCorrected({{window, no_cameras, view, planes, {}},
+                                                    recording.trajectory,
+                                                    options,
+                                                    c.with_sink ? &sink : nullptr},
+                                                   map_along, align);
+    ASSERT_EQ(aligned_to.size(), static_cast<std::size_t>(c.aligned));
+    EXPECT_EQ(aligned_to.front(), 0.5F) << "the depth of the central part";
+    for (std::size_t i = 1; i < aligned_to.size(); ++i) {
+      EXPECT_EQ(aligned_to[i], static_cast<float>(i + 1)) << "the depth of the round before";
+    }
     for (std::size_t i = 0; i < sinks.size(); ++i) {
       const bool last = c.with_sink && i + 1 == sinks.size();
       EXPECT_EQ(sinks[i], last ? &sink : nullptr);
@@ -314,7 +330,7 @@ TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
       EXPECT_EQ(poses[i] == recording.trajectory.poses().size(), tracked) << i;
     }
     EXPECT_EQ(keyframe.without_pose,
-              static_cast<std::uint64_t>(c.with_sink ? c.mapped - 1 : c.taken));
+              static_cast<std::uint64_t>(c.with_sink ? sinks.size() - 1 : c.taken));
     EXPECT_EQ(keyframe.motion_correction.has_value(), c.taken > 0);
   }
 }
@@ -335,8 +351,8 @@ TEST(Stages, OfAKeyframeAreTheRaysTheSweepAndTheDepth) {
     StageLog log;
     mapper.map(test::RandomRecording::kWindow, recording.spans(), recording.trajectory, nullptr,
                &log);
-    // The correction counts as a part of the sweep.
-    EXPECT_THAT(log.stages, ::testing::StartsWith(correct_motion ? "sSsSdDsSsSsSdD" : "sSsSdD"));
+    // The whole window, its central part, the alignment, which counts as a part of the sweep.
+    EXPECT_THAT(log.stages, ::testing::StartsWith(correct_motion ? "sSsSdDsSsSdDsS" : "sSsSdD"));
   }
 }
 

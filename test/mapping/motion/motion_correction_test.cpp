@@ -2,13 +2,17 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/motion/motion_correction.h"
+#include "mapping/motion/slice_alignment.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
 #include "test/mapping/keyframes/random_scene.h"
@@ -17,63 +21,104 @@
 namespace efm::motion_correction_test {
 namespace {
 
-TEST(QuasiNewton, FindsTheBottomOfRosenbrocksValley) {
-  const auto valley = [](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
-    const double off = at[1] - at[0] * at[0];
-    slope.resize(2);
-    slope << -2 * (1 - at[0]) - 400 * at[0] * off, 200 * off;
-    return (1 - at[0]) * (1 - at[0]) + 100 * off * off;
-  };
-  QuasiNewtonOptions options;
-  options.max_evaluations = 60;  // a wrong Hessian needs hundreds
-  options.min_step = 1e-12;
-  const Eigen::VectorXd found = minimise(valley, Eigen::Vector2d(-1.2, 1), options);
-  EXPECT_NEAR(found[0], 1, 1e-5);
-  EXPECT_NEAR(found[1], 1, 1e-5);
-}
-
-TEST(QuasiNewton, IsNeverWorseThanItsStartAndKeepsItsBound) {
-  for (int most = 1; most <= 12; ++most) {
-    int evaluations = 0;
-    const auto waves = [&](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
-      ++evaluations;
-      slope = 9 * (9 * at.array()).cos().matrix() + 0.2 * at;
-      return (9 * at.array()).sin().sum() + 0.1 * at.squaredNorm();
-    };
-    Eigen::VectorXd unused;
-    const Eigen::Vector3d start(0.3, -0.7, 2);
-    QuasiNewtonOptions options;
-    options.max_evaluations = most;
-    const Eigen::VectorXd found = minimise(waves, start, options);
-    EXPECT_LE(evaluations, most);
-    EXPECT_LE(waves(found, unused), waves(start, unused));
-  }
-}
-
-TEST(QuasiNewton, StaysOnAFlatFunctionAndGoesOnDownASlope) {
-  QuasiNewtonOptions options;
-  options.max_evaluations = 10;
-  for (const double slope : {0.0, 1.0}) {
-    const auto ramp = [&](const Eigen::VectorXd& at, Eigen::VectorXd& gradient) {
-      gradient = Eigen::Vector2d(slope, 0);
-      return slope * at.x();
-    };
-    const Eigen::VectorXd found = minimise(ramp, Eigen::Vector2d(3, 4), options);
-    EXPECT_EQ(found.y(), 4);
-    EXPECT_LE(found.x(), 3 - 0.5 * slope) << "a tenth each time";
-  }
-}
-
-}  // namespace
-
-// Whole keyframes along corrected motions. test/integration tests the quality of the correction.
-
-namespace {
-
 using test::map;
 using test::MovingEdges;
 using test::RandomRecording;
 using test::same;
+
+constexpr std::int64_t kMillisecond = 1'000'000;
+
+TEST(MotionCorrectionKnots, CoverTheWindowWithOneAtTheReference) {
+  const struct {
+    Window window;
+    std::size_t reference;
+    std::size_t knots;
+  } cases[] = {{{0, 200 * kMillisecond, 100 * kMillisecond}, 10, 21},
+               {{0, 205 * kMillisecond, 0}, 0, 22},
+               {{0, 95 * kMillisecond, 95 * kMillisecond}, 10, 11},
+               {{0, 5 * kMillisecond, 2 * kMillisecond}, 1, 3},
+               {{50 * kMillisecond, 60 * kMillisecond, 0}, 0, 7},
+               {{0, 10 * kMillisecond, 20 * kMillisecond}, 2, 3}};
+  for (const auto& c : cases) {
+    const MotionCorrection knots = knotsOf(c.window, 0.01);
+    EXPECT_EQ(knots.reference, c.reference);
+    EXPECT_EQ(knots.knots.size(), c.knots);
+    EXPECT_TRUE(isSame(knots.displacement(0.003), Rigid3{}));
+  }
+}
+
+TEST(MotionCorrectionKnots, AreInterpolatedAndHeldBeyondTheEnds) {
+  MotionCorrection correction;
+  correction.spacing_s = 0.1;
+  correction.reference = 1;
+  correction.knots.assign(3, Vector6d::Zero());
+  correction.knots[0] << 1, 2, 3, 0.1, 0, 0;
+  correction.knots[2] << 4, 0, 0, 0, 0.2, 0;
+  const auto expect = [&](double since_s, const Eigen::Vector3d& shift, double x, double y) {
+    const Rigid3 T = correction.displacement(since_s);
+    EXPECT_LT((T.translation - shift).norm(), 1e-12) << since_s;
+    EXPECT_NEAR(T.rotation.x(), std::sin(x / 2), 1e-12) << since_s;
+    EXPECT_NEAR(T.rotation.y(), std::sin(y / 2), 1e-12) << since_s;
+  };
+  expect(-0.1, {1, 2, 3}, 0.1, 0);
+  expect(-0.7, {1, 2, 3}, 0.1, 0);
+  expect(-0.025, {0.25, 0.5, 0.75}, 0.025, 0);
+  expect(0, {0, 0, 0}, 0, 0);
+  expect(0.05, {2, 0, 0}, 0, 0.1);
+  expect(9, {4, 0, 0}, 0, 0.2);
+  EXPECT_TRUE(isSame(MotionCorrection{}.displacement(0.3), Rigid3{}));
+}
+
+/// The corrected motion is the tracker's, moved by the correction, also where a tracker has few
+/// poses; a gap stays a gap.
+TEST(MotionCorrectionKnots, MoveTheTrajectory) {
+  const RandomRecording recording(2, 1, 10);
+  const Window window = RandomRecording::kWindow;
+  MotionCorrection correction = knotsOf(window, 0.01);
+  for (std::size_t i = 0; i < correction.knots.size(); ++i) {
+    const double since_s = correction.sinceReference(i);
+    correction.knots[i] << 0.05 * since_s, -0.03 * since_s, 0, 0.1 * since_s, 0, since_s * since_s;
+  }
+  for (const std::size_t every : {1, 8}) {
+    Trajectory tracked;
+    const auto& poses = recording.trajectory.poses();
+    for (std::size_t i = 0; i < poses.size(); i += every) tracked.add(poses[i]);
+    tracked.add(poses.back());
+    const Trajectory corrected = correctedTrajectory(tracked, window, correction);
+    EXPECT_TRUE(
+        isSame(corrected.poseAt(window.t_ref_ns).value(), tracked.poseAt(window.t_ref_ns).value()));
+    for (std::int64_t t_ns = window.t0_ns; t_ns < window.t1_ns; t_ns += 3 * kMillisecond) {
+      const double since_s = 1e-9 * static_cast<double>(t_ns - window.t_ref_ns);
+      const Rigid3 expected = tracked.poseAt(t_ns).value() * correction.displacement(since_s);
+      const Rigid3 T = corrected.poseAt(t_ns).value();
+      // Interpolation of poses differs in second order from that of corrections.
+      EXPECT_LT((T.translation - expected.translation).norm(), 1e-5);
+      EXPECT_LT((T.rotation.conjugate() * expected.rotation).vec().norm(), 1e-5);
+    }
+  }
+  Trajectory gap(TrajectoryOptions{0.001});
+  for (const StampedPose& pose : recording.trajectory.poses()) gap.add(pose);
+  gap.add({window.t_ref_ns, gap.poses().front().T_world_rig});
+  EXPECT_FALSE(
+      correctedTrajectory(gap, window, correction).poseAt(window.t_ref_ns + 2 * kMillisecond));
+}
+
+TEST(CentralPart, HasTheEventsAroundTheReferenceTime) {
+  std::vector<Event> events;
+  for (int i = 0; i < 100; ++i) events.push_back({i * kMillisecond, 0, 0, true});
+  const ReferenceView view;
+  const DepthPlanes planes;
+  const Window window{0, 100 * kMillisecond, 80 * kMillisecond};
+  const std::vector<CameraEvents> cameras = {{0, nullptr, nullptr, events}};
+  const CentralPart part({window, cameras, view, planes, {}}, 0.5);
+  EXPECT_EQ(part.window.t0_ns, 40 * kMillisecond);
+  EXPECT_EQ(part.window.t1_ns, 90 * kMillisecond);
+  EXPECT_EQ(part.window.t_ref_ns, 80 * kMillisecond);
+  ASSERT_EQ(part.cameras.front().events.size(), 50U);
+  EXPECT_EQ(part.cameras.front().events[0].t_ns, 40 * kMillisecond);
+}
+
+// Whole keyframes along corrected motions. test/integration tests the quality of the correction.
 
 KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   KeyframeMapperOptions options;
@@ -83,11 +128,15 @@ KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   return options;
 }
 
-/// Returns edges with a tracker that has errors of linear and angular velocity.
+/// Returns edges with a tracker that has errors of position and rotation, as a walk.
 MovingEdges blurred(int cameras) {
   MovingEdges recording(cameras);
-  recording.trajectory = correctedTrajectory(recording.trajectory, MovingEdges::kWindow,
-                                             {{0.03, 0, 0}, {0, 0.15, 0.1}});
+  MotionCorrection errors = knotsOf(MovingEdges::kWindow, 0.02);
+  for (std::size_t i = 0; i < errors.knots.size(); ++i) {
+    const double since_s = errors.sinceReference(i);
+    errors.knots[i] << 0.06 * since_s, 0, 0, 0, 0.2 * std::sin(30 * since_s) / 30, 0.1 * since_s;
+  }
+  recording.trajectory = correctedTrajectory(recording.trajectory, MovingEdges::kWindow, errors);
   return recording;
 }
 
@@ -115,6 +164,125 @@ class PlaneCounter : public DsiSink {
  private:
   std::mutex mutex_;
 };
+
+/// Slices of 10 ms of edges that move in both cameras. Depths are exact.
+struct Slices {
+  MovingEdges recording;
+  UndistortionTable undistortion{recording.rig.cameras.front().model};
+  ReferenceView view = ReferenceView::of(recording.rig.cameras.front().model);
+  DepthPlanes planes{{0.7, 5.0, 60, PlaneSpacing::kInverse}};
+  std::vector<CameraEvents> cameras;
+  cv::Mat1f depth = map(recording, recording.cameras(), options(false)).map.depth;
+  MotionCorrectionOptions correction;
+
+  explicit Slices(int count) : recording(count) {
+    for (int c = 0; c < count; ++c) {
+      const auto camera = static_cast<std::size_t>(c);
+      cameras.push_back(
+          {c, &recording.rig.cameras[camera], &undistortion, recording.events[camera]});
+    }
+  }
+
+  WindowInput input() const {
+    return {MovingEdges::kWindow, cameras, view, planes,
+            recording.trajectory.poseAt(MovingEdges::kWindow.t_ref_ns).value()};
+  }
+  std::optional<AlignedMotion> align(const Trajectory& tracked) const {
+    const WindowInput window = input();
+    const SliceAlignment slices(window, tracked, correction);
+    return slices.align(depth, slices.none());
+  }
+};
+
+TEST(SliceAlignment, FindsTheTrueMotionOfTheImage) {
+  const Slices slices(2);
+  const auto exact = slices.align(slices.recording.trajectory);
+  ASSERT_TRUE(exact);
+  // Edges lie on whole pixels, up to half a pixel from their true places.
+  EXPECT_LT(exact->shift_px, 0.6);
+  // A turn about y, as large as 3 pixels at the ends of the window.
+  MotionCorrection wrong = knotsOf(MovingEdges::kWindow, 0.01);
+  for (std::size_t i = 0; i < wrong.knots.size(); ++i) {
+    wrong.knots[i][4] = 0.03 * wrong.sinceReference(i) / 0.1;
+  }
+  const auto found =
+      slices.align(correctedTrajectory(slices.recording.trajectory, MovingEdges::kWindow, wrong));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->shift_px, 90 * 0.03 / std::sqrt(3.0), 0.5);
+  double squares = 0;
+  for (std::size_t i = 0; i < wrong.knots.size(); ++i) {
+    // What is left moves the image; a shift and a turn about y do this together.
+    const Vector6d left = found->correction.knots[i] + wrong.knots[i];
+    const double px = MovingEdges::kFocal_px * (left[4] + left[0] / 2);
+    squares += px * px / static_cast<double>(wrong.knots.size());
+  }
+  EXPECT_LT(std::sqrt(squares), 0.6);
+  EXPECT_TRUE(found->correction.knots[found->correction.reference].isZero());
+}
+
+TEST(SliceAlignment, ExpectsTheErrorsOfTheOptions) {
+  Slices slices(2);
+  // A tracker that stands still has no errors in proportion to its speed.
+  Trajectory still;
+  for (const StampedPose& pose : slices.recording.trajectory.poses()) {
+    still.add({pose.t_ns, slices.recording.trajectory.poses().front().T_world_rig});
+  }
+  slices.correction.motion_sigma_m_s = 1e-6;
+  slices.correction.motion_sigma_deg_s = 1e-6;
+  const auto stays = slices.align(still);
+  ASSERT_TRUE(stays);
+  EXPECT_LT(stays->shift_px, 0.01);
+  slices.correction.motion_sigma_m_s = 10;
+  EXPECT_GT(slices.align(still)->shift_px, 1);
+}
+
+TEST(SliceAlignment, NeedsPointsAndAPoseAndDoesWithGapsAndWithoutEvents) {
+  const Slices slices(2);
+  const Trajectory& exact = slices.recording.trajectory;
+  Slices empty(2);
+  empty.depth.setTo(0);
+  EXPECT_FALSE(empty.align(exact));
+  EXPECT_FALSE(slices.align(Trajectory()));
+  Trajectory gap(TrajectoryOptions{0.006});
+  for (const StampedPose& pose : exact.poses()) {
+    const std::int64_t since_ns = pose.t_ns - MovingEdges::kStart_ns;
+    if (since_ns < 30'000'000 || since_ns > 60'000'000) gap.add(pose);
+  }
+  const auto over_gap = slices.align(gap);
+  ASSERT_TRUE(over_gap);
+  for (const Vector6d& knot : over_gap->correction.knots) EXPECT_TRUE(knot.allFinite());
+  Slices silent(2);
+  for (CameraEvents& camera : silent.cameras) camera.events = {};
+  ASSERT_TRUE(silent.align(exact));
+  EXPECT_EQ(silent.align(exact)->shift_px, 0) << "nothing but the prior";
+}
+
+TEST(EdgesIn, AreHighOnAnEdgeAtEachLevelWhateverItsContrast) {
+  CameraModel model{640, 480, 500, 500, 320, 240, DistortionModel::kNone, {}};
+  const UndistortionTable undistortion(model);
+  const ReferenceView view = ReferenceView::of(model);
+  for (const int events_per_pixel : {1, 3}) {
+    std::vector<Event> events;
+    for (std::uint16_t y = 0; y < 480; ++y) {
+      for (int i = 0; i < events_per_pixel; ++i) events.push_back({0, 200, y, true});
+    }
+    for (const int finest : {0, 1}) {
+      const EdgeLevels levels = edgesIn(events, undistortion, view, finest);
+      ASSERT_EQ(levels.size(), 3U);
+      for (std::size_t level = 0; level < levels.size(); ++level) {
+        const cv::Mat1b& edges = levels[level];
+        const int halvings = finest + static_cast<int>(level);
+        ASSERT_EQ(edges.size(), cv::Size(640 >> halvings, 480 >> halvings));
+        const int row = edges.rows / 2;
+        const int column = 200 >> halvings;
+        EXPECT_GT(edges(row, column), 250) << halvings;
+        EXPECT_LT(edges(row, column + 8), 140);
+        EXPECT_GE(edges(row, column), edges(row, column + 1));
+      }
+    }
+  }
+  EXPECT_TRUE(edgesIn(std::vector<Event>(49), undistortion, view, 0).empty()) << "too few events";
+}
 
 TEST(MotionCorrection, ABlurredKeyframeIsMappedAlongTheCorrectedMotionAndBecomesSharper) {
   const auto sharpness = [](const KeyframeDepthMap& keyframe) {
@@ -183,57 +351,6 @@ TEST(MotionCorrection, ASilentCameraAndASinglePlaneDoNoHarm) {
   KeyframeMapperOptions excluding = options(true);
   excluding.exclude_silent = true;
   expectSame(map(recording, {0}, options(true)), map(recording, {0, 1}, excluding));
-}
-
-TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
-  // Events of edges in both cameras, blurred by up to 4 px by a wrong velocity along one axis.
-  const auto blurred_by = [](int axis, float velocity) {
-    std::vector<WarpedEvent> events;
-    for (int i = 0; i < 400; ++i) {
-      const float since = static_cast<float>(i % 20) / 10 - 1;
-      WarpedEvent event;
-      event.by_velocity.setZero();
-      event.by_velocity(0, axis) = 4 * since / velocity;
-      event.by_inverse_depth.setZero();
-      event.pixel = {10.3F + 12 * static_cast<float>(i / 100) - 4 * since,
-                     4.4F + static_cast<float>(i / 20 % 5)};
-      events.push_back(event);
-    }
-    return std::vector<std::vector<WarpedEvent>>{events, events};
-  };
-  const ContrastSearch search{cv::Size(60, 14), 0.01, {}};
-  constexpr float kVelocity = 0.1F;  // m/s and rad/s
-  const auto found = [&](double sigma_m_s, double sigma_rad_s, int axis) {
-    MotionCorrectionOptions options;
-    options.motion_sigma_m_s = sigma_m_s;
-    options.motion_sigma_deg_s = sigma_rad_s / kRadiansPerDegree;
-    const auto motion = maximizeContrast(blurred_by(axis, kVelocity), search, options);
-    return axis < 3 ? motion.linear_m_s[axis] : motion.angular_rad_s[axis - 3];
-  };
-  EXPECT_NEAR(found(0.1, 0.1, 0), 0.1, 0.02);
-  EXPECT_NEAR(found(0.1, 0.1, 4), 0.1, 0.02);
-  for (const int axis : {1, 2, 3, 5}) EXPECT_NEAR(found(0.1, 0.1, axis), 0.1, 0.02) << axis;
-  // A sigma of 1/1000 of the velocity keeps it near 0, a sigma of 1/20 does not.
-  EXPECT_LT(std::abs(found(1e-4, 0.1, 0)), 0.03);
-  EXPECT_LT(std::abs(found(0.1, 1e-4, 4)), 0.03);
-  EXPECT_GT(found(0.005, 0.1, 0), 0.06);
-  EXPECT_GT(found(0.1, 0.005, 4), 0.06);
-}
-
-TEST(MotionCorrection, WithoutEventsThatMeetTheCorrectionIsThatOfTheInput) {
-  WarpedEvent event;
-  event.by_velocity.setOnes();
-  event.by_inverse_depth.setOnes();
-  event.pixel = {10, 10};
-  WarpedEvent other = event;
-  other.pixel = {50, 10};
-  const ContrastSearch search{cv::Size(60, 20), 0.01, {{1, 2, 3}, {4, 5, 6}}};
-  const std::vector<std::vector<WarpedEvent>> none(2);
-  for (const auto& events : {none, {{event}, {other}}}) {
-    const VelocityCorrection found = maximizeContrast(events, search, {});
-    EXPECT_LT((found.linear_m_s - search.current.linear_m_s).norm(), 1e-12);
-    EXPECT_LT((found.angular_rad_s - search.current.angular_rad_s).norm(), 1e-12);
-  }
 }
 
 }  // namespace
