@@ -105,6 +105,11 @@ struct MotionCorrection {
   double sinceReference(std::size_t knot) const {
     return spacing_s * (static_cast<double>(knot) - static_cast<double>(reference));
   }
+  /// Returns whether a time after (negative: before) the reference time lies between two knots.
+  bool covers(double since_s) const {
+    return !knots.empty() && since_s >= sinceReference(0) &&
+           since_s <= sinceReference(knots.size() - 1);
+  }
   /// Returns T_rig_true, interpolated; beyond the knots it is that of the nearest one.
   Rigid3 displacement(double since_s) const;
 };

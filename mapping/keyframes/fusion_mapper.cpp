@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -313,6 +314,12 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
   ++counts_.keyframes;
   counts_.votes += keyframe->votes;
   counts_.silent_subintervals += keyframe->silent_subintervals;
+  MotionCounts motion;
+  motion.known = keyframe->blur_px ? 1 : 0;
+  motion.blur_px = keyframe->blur_px.value_or(0);
+  motion.corrected = keyframe->motion_correction ? 1 : 0;
+  motion.log_gain = std::log(keyframe->sharpness_gain);
+  counts_.motion += motion;
   counts_.event_uses =
       std::accumulate(keyframe->events.begin(), keyframe->events.end(), counts_.event_uses);
   for (CameraStream& camera : cameras_) {

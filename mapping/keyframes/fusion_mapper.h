@@ -134,6 +134,7 @@ class FusionMapper : private RecordingProgress {
   /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);
 
+  std::uint64_t correctedKeyframes() const { return counts_.motion.corrected; }
   /// Returns the counts, complete once `finish` was called and `next` returned std::nullopt.
   MapperCounts counts() const;
   const Rig& rig() const { return rig_; }

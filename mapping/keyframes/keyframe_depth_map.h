@@ -43,6 +43,7 @@ cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView
 struct KeyframeDepthMap {
   Window window;
   Rigid3 T_world_ref;  ///< Pose of the reference view.
+  Rigid3 T_rig_ref;    ///< The same, on the rig.
   ReferenceView view;
   DepthMap map;
   /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
@@ -50,6 +51,9 @@ struct KeyframeDepthMap {
   double max_confidence = 0;  ///< Maximum over all pixels, with depth or without.
   /// Correction of the tracker's motion in the window, if one was found.
   std::optional<MotionCorrection> motion_correction;
+  /// By how much the poses blur the events, pixels; std::nullopt: not looked at, or not known.
+  std::optional<double> blur_px;
+  double sharpness_gain = 1;  ///< By the correction.
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;

@@ -70,6 +70,12 @@ double sharpnessOf(const KeyframeDepthMap& keyframe) {
   return keyframe.map.confidence.dot(keyframe.map.confidence);
 }
 
+/// Part of a window around the reference time. There the tracker's errors are small, and the depth
+/// of its events has a right scale.
+constexpr double kCentral = 0.2;
+/// Fewest depth planes to look for blur.
+constexpr int kMinPlanes = 25;
+
 }  // namespace
 
 KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along,
@@ -77,34 +83,43 @@ KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map
   const MotionCorrectionOptions& options = window.options;
   const WindowInput& input = window.input;
   KeyframeDepthMap keyframe = map_along(input, window.tracked, nullptr);
-  // Near the reference time the tracker's errors are small: this depth has a right scale.
-  constexpr double kCentral = 0.2;
-  const CentralPart central(input, kCentral);
-  const WindowInput central_input{central.window, central.cameras, input.view, input.planes,
-                                  input.T_world_ref};
-  cv::Mat1f depth = map_along(central_input, window.tracked, nullptr).map.depth;
+  const double sharpness = sharpnessOf(keyframe);
+  std::optional<double> blur_px;
+  cv::Mat1f depth = window.central_depth;
   Trajectory motion = window.tracked;
   for (int round = 0; round < options.motion_rounds; ++round) {
     std::optional<AlignedMotion> aligned;
     {
       const StageScope scope(window.stages, Stage::kSweep);
       aligned = align(depth, keyframe.motion_correction);
+      // In slow motion the central part may have too few points.
+      if (!aligned && round == 0) aligned = align(keyframe.map.depth, std::nullopt);
     }
-    constexpr double kSameMotionPx = 0.25;  // does not blur the DSI
-    if (!aligned || aligned->shift_px < kSameMotionPx) break;
+    // Less does not blur the DSI. With `auto`, the first round asks for more: exact poses have up
+    // to 0.4 pixels.
+    const bool watches = options.correct_motion == MotionCorrectionUse::kAuto;
+    const double same_motion_px = watches && round == 0 ? 0.45 : 0.25;
+    if (!aligned) break;
+    if (round == 0) blur_px = 0;
+    if (aligned->shift_px < same_motion_px) break;
     Trajectory corrected = correctedTrajectory(window.tracked, input.window, aligned->correction);
     KeyframeDepthMap sharper = map_along(input, corrected, nullptr);
     const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
     if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(keyframe))) break;
+    if (round == 0) blur_px = aligned->shift_px;
     motion = std::move(corrected);
     keyframe = std::move(sharper);
     keyframe.motion_correction = aligned->correction;
     depth = keyframe.map.depth;
   }
-  if (window.sink == nullptr) return keyframe;
-  const std::optional<MotionCorrection> correction = keyframe.motion_correction;
-  keyframe = map_along(input, motion, window.sink);
-  keyframe.motion_correction = correction;
+  const double gain = sharpness > 0 ? sharpnessOf(keyframe) / sharpness : 1;
+  if (window.sink != nullptr) {
+    std::optional<MotionCorrection> correction = std::move(keyframe.motion_correction);
+    keyframe = map_along(input, motion, window.sink);
+    keyframe.motion_correction = std::move(correction);
+  }
+  keyframe.blur_px = blur_px;
+  keyframe.sharpness_gain = gain;
   return keyframe;
 }
 
@@ -189,19 +204,10 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   const WindowInput input{window, cameras, view_, planes_, referencePose(*T_world_rig)};
   // 3-5. From events to depth.
   tbb::task_arena arena(options_.sweep.threadsOrCores());
-  const auto map_along = [&](const WindowInput& part, const Trajectory& motion, DsiSink* dsi) {
-    return mapAlong(part, motion, dsi, stages);
-  };
-  KeyframeDepthMap keyframe = arena.execute([&] {
-    if (!options_.motion.correct_motion) return map_along(input, trajectory, sink);
-    std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
-    const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
-      if (!slices) slices.emplace(input, trajectory, options_.motion);
-      return slices->align(depth, start.value_or(slices->none()));
-    };
-    return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along, align);
-  });
+  KeyframeDepthMap keyframe =
+      arena.execute([&] { return mapBest(input, trajectory, sink, stages); });
 
+  keyframe.T_rig_ref = referencePose({});
   keyframe.over_budget = over_budget;
   sequence_maximum_.add(keyframe.max_confidence);
   if (options_.event_images) {
@@ -229,6 +235,51 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
   return cameras;
 }
 
+/// Maps a window, with correction of the motion where the options or the blur of the events call
+/// for it.
+KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Trajectory& tracked,
+                                         DsiSink* sink, StageHook* stages) {
+  const MotionCorrectionUse use = options_.motion.correct_motion;
+  if (use == MotionCorrectionUse::kNever) return mapAlong(input, tracked, sink, stages);
+  const bool watches = use == MotionCorrectionUse::kAuto;
+  const auto corrects = [&] { return !watches || (input.cameras.size() > 1 && blur_.isOn()); };
+  const auto map_along = [&](const WindowInput& part, const Trajectory& motion, DsiSink* dsi) {
+    return mapAlong(part, motion, dsi, stages);
+  };
+  const CentralPart central(input, kCentral);
+  std::optional<double> looked_px;
+  if (!corrects()) {
+    if (blur_.isDue()) {
+      DepthPlanesOptions coarse = options_.planes;
+      coarse.num_planes = std::min(coarse.num_planes, std::max(kMinPlanes, coarse.num_planes / 4));
+      const DepthPlanes planes(coarse);
+      const cv::Mat1f depth = map_along(central.input(input, planes), tracked, nullptr).map.depth;
+      const StageScope scope(stages, Stage::kSweep);
+      const SliceAlignment slices(input, tracked, options_.motion, SliceEffort::look());
+      const std::optional<AlignedMotion> aligned = slices.align(depth, slices.none());
+      if (aligned) looked_px = aligned->shift_px;
+    }
+    blur_.add(looked_px);
+    if (!corrects()) {
+      KeyframeDepthMap keyframe = mapAlong(input, tracked, sink, stages);
+      keyframe.blur_px = looked_px;
+      return keyframe;
+    }
+  }
+  const cv::Mat1f central_depth =
+      map_along(central.input(input, input.planes), tracked, nullptr).map.depth;
+  std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
+  const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
+    if (!slices) slices.emplace(input, tracked, options_.motion);
+    return slices->align(depth, start.value_or(slices->none()));
+  };
+  KeyframeDepthMap keyframe = mapCorrected(
+      {input, tracked, options_.motion, central_depth, sink, stages}, map_along, align);
+  if (watches && !looked_px) blur_.add(keyframe.blur_px);
+  if (looked_px) blur_.setLast(keyframe.blur_px.value_or(0));
+  return keyframe;
+}
+
 KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajectory& motion,
                                           DsiSink* sink, StageHook* stages) const {
   KeyframeDepthMap keyframe;
@@ -253,15 +304,16 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);  // apart from the rays, for benchmarks
-    swept = fuse(cameras, sink);                    // 4.
+    swept = fuse(cameras, input.planes, sink);      // 4.
   }
   const StageScope scope(stages, Stage::kDepth);
-  extract(swept, cameras, keyframe);  // 5.
+  extract(swept, cameras, input.planes, keyframe);  // 5.
   return keyframe;
 }
 
 /// 4. Votes, and fuses the DSIs across cameras and time, plane by plane. Consumes the rays.
-SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const {
+SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
+                                 DsiSink* sink) const {
   const FusionLayout layout = groups_.layoutOf(static_cast<int>(cameras.size()));
   std::vector<CameraRays> rays;
   for (const auto& slots : layout.inputs) {
@@ -276,12 +328,12 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink
   if (extraction.extraction == ExtractionMethod::kAggregated) {
     request.column_window = extraction.threshold_kernel;
   }
-  return sweepSpace(std::move(rays), {view_, planes_}, options_.sweep, request);
+  return sweepSpace(std::move(rays), {view_, planes}, options_.sweep, request);
 }
 
 /// 5. Finds depth and confidence in the fused DSI.
 void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
-                             KeyframeDepthMap& keyframe) const {
+                             const DepthPlanes& planes, KeyframeDepthMap& keyframe) const {
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
   cv::minMaxLoc(swept.fused.peaks.confidence, nullptr, &keyframe.max_confidence);
   RobustMaximum running_maximum = sequence_maximum_;
@@ -289,7 +341,7 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
   KeyframeFacts facts{{}, keyframe.parallax_px_m};
   facts.sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : running_maximum.value();
-  keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, facts);
+  keyframe.map = extractDepth(swept.fused, planes, options_.extraction, facts);
 
   if (!options_.camera_maps) return;
   if (swept.cameras.empty()) {  // a single camera: its map is the keyframe's
@@ -299,7 +351,7 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
     // Without the sequence maximum: the ray densities of one camera differ from fused densities.
     facts.sequence_maximum.reset();
     keyframe.camera_maps.push_back(
-        {cameras[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction, facts)});
+        {cameras[c].camera, extractDepth(swept.cameras[c], planes, options_.extraction, facts)});
   }
 }
 

@@ -74,8 +74,9 @@ struct CorrectedWindow {
   const WindowInput& input;
   const Trajectory& tracked;
   const MotionCorrectionOptions& options;
-  DsiSink* sink = nullptr;      ///< May be null; receives only the DSI of the result.
-  StageHook* stages = nullptr;  ///< May be null.
+  const cv::Mat1f& central_depth;  ///< Along the tracker's motion, of the central part.
+  DsiSink* sink = nullptr;         ///< May be null; receives only the DSI of the result.
+  StageHook* stages = nullptr;     ///< May be null.
 };
 
 /// Maps a window or a part of it along a motion; the sink may be null.
@@ -121,7 +122,7 @@ struct KeyframeMapperOptions {
 
 /// The method: it maps the events and poses of one window to one semi-dense depth map (Ghosh and
 /// Gallego 2022, Algorithm 2 for any number of cameras; with one sub-interval Algorithm 1). From
-/// one window to the next it keeps only the running maximum of confidences.
+/// one window to the next it keeps only the running maximum of confidences, and the blur by poses.
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
@@ -151,11 +152,14 @@ class KeyframeMapper {
     return rig_.cameras[static_cast<std::size_t>(index)];
   }
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
+  KeyframeDepthMap mapBest(const WindowInput& input, const Trajectory& tracked, DsiSink* sink,
+                           StageHook* stages);
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageHook* stages) const;
-  SweepResult fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const;
+  SweepResult fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
+                   DsiSink* sink) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
-               KeyframeDepthMap& keyframe) const;
+               const DepthPlanes& planes, KeyframeDepthMap& keyframe) const;
 
   Rig rig_;
   std::vector<int> selected_;
@@ -165,6 +169,7 @@ class KeyframeMapper {
   EventGroups groups_;
   std::vector<UndistortionTable> undistortion_;  // per selected camera
   RobustMaximum sequence_maximum_;
+  BlurWatch blur_;
 };
 
 /// The motion of the selected cameras relative to the reference view within a window: maxima.

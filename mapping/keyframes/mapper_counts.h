@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -40,6 +41,27 @@ inline constexpr DropReasonRow kDropReasons[] = {
 };
 using DroppedWindows = CountsBy<DropReason, std::size(kDropReasons)>;
 
+/// Keyframes by what is known of the motion in their windows.
+struct MotionCounts {
+  std::uint64_t known = 0;      ///< Keyframes with a known blur by poses.
+  std::uint64_t corrected = 0;  ///< Keyframes with a corrected motion.
+  double blur_px = 0;           ///< Sum over the known ones.
+  double log_gain = 0;          ///< Sum over the corrected ones: of the sharpness.
+
+  double meanBlurPx() const { return known > 0 ? blur_px / static_cast<double>(known) : 0; }
+  /// Returns how many times as sharp the corrected keyframes are.
+  double meanGain() const {
+    return corrected > 0 ? std::exp(log_gain / static_cast<double>(corrected)) : 1;
+  }
+  MotionCounts& operator+=(const MotionCounts& other) {
+    known += other.known;
+    corrected += other.corrected;
+    blur_px += other.blur_px;
+    log_gain += other.log_gain;
+    return *this;
+  }
+};
+
 struct MapperCounts {
   std::vector<EventCounts> cameras;
   std::uint64_t event_uses = 0;  ///< Events that voted, summed over keyframes, which may overlap.
@@ -52,6 +74,7 @@ struct MapperCounts {
   std::uint64_t sorted_events = 0;  ///< Events that came after a newer event of their camera.
   std::uint64_t late_events = 0;    ///< See `FusionMapper::dropLate`.
   std::uint64_t duplicate_poses = 0;
+  MotionCounts motion;
 
   EventCounts total() const {
     EventCounts sum;
@@ -71,6 +94,7 @@ struct MapperCounts {
     sorted_events += other.sorted_events;
     late_events += other.late_events;
     duplicate_poses += other.duplicate_poses;
+    motion += other.motion;
     return *this;
   }
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "mapping/base/option.h"
@@ -8,6 +10,17 @@
 #include "mapping/geometry/trajectory.h"
 
 namespace efm {
+
+/// The windows whose motion is corrected.
+enum class MotionCorrectionUse {
+  kNever,   ///< "false"
+  kAlways,  ///< "true"
+  kAuto,    ///< Where the poses blur the events: see `BlurWatch`. Needs several cameras.
+};
+
+std::string_view nameOf(MotionCorrectionUse use);
+/// @throws std::invalid_argument if the name is unknown.
+MotionCorrectionUse motionCorrectionUseFromName(std::string_view name);
 
 /// Correction of the motion within a window. Trackers wander by some per cent of their travel
 /// within tenths of a second. A window then has a wrong motion, which blurs the DSI. The correction
@@ -17,7 +30,7 @@ namespace efm {
 ///
 /// The correction needs several cameras: the depth of a single camera fits a wrong motion.
 struct MotionCorrectionOptions {
-  bool correct_motion = false;
+  MotionCorrectionUse correct_motion = MotionCorrectionUse::kNever;
   /// Standard deviations of the tracker's velocity error on each axis, within one slice. The
   /// correction expects at least these errors, and errors of half the speed. They keep the
   /// correction near 0 if the events do not determine it. Above 0, at most 10 m/s and 1000 degrees
@@ -30,7 +43,7 @@ struct MotionCorrectionOptions {
   int motion_rounds = 3;
   /// Fraction by which the sharpness of the fused DSI must grow before a correction is accepted: a
   /// smaller gain may be chance. 0 to 1.
-  double min_gain = 0.01;
+  double min_gain = 0.02;
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -55,6 +68,27 @@ MotionCorrection knotsOf(const Window& window, double spacing_s);
 Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& window,
                                const MotionCorrection& correction);
 
+/// Decides from the blur of some windows whether the poses blur them: by the median of the last
+/// three. It looks at the first, the fifth and the ninth window, and then at each eighth; and at
+/// the next one if a blur is near the limit.
+class BlurWatch {
+ public:
+  /// Returns whether the poses blur the windows.
+  bool isOn() const;
+  /// Returns whether the next window is to be looked at.
+  bool isDue() const;
+  /// Adds a window.
+  /// @param blur_px by how much the poses blur its events, pixels; std::nullopt: not looked at, or
+  /// not known.
+  void add(std::optional<double> blur_px);
+  /// Replaces the blur of the last window that was looked at by a better value.
+  void setLast(double blur_px) { last_px_.front() = blur_px; }
+
+ private:
+  std::vector<double> last_px_;  // the newest first
+  int since_look_ = 0;           // windows
+};
+
 /// The part of a window around its reference time, with its events.
 struct CentralPart {
   Window window;
@@ -62,6 +96,10 @@ struct CentralPart {
 
   /// @param fraction of the window, above 0, at most 1.
   CentralPart(const WindowInput& input, double fraction);
+  /// Returns the input of this part, with these planes.
+  WindowInput input(const WindowInput& of_window, const DepthPlanes& planes) const {
+    return {window, cameras, of_window.view, planes, of_window.T_world_ref};
+  }
 };
 
 }  // namespace efm

@@ -17,13 +17,12 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Length of a slice. A longer one would be blurred by its own motion.
-constexpr double kSpacingS = 0.01;
+constexpr double kLengthS = 0.01;
 constexpr std::size_t kLevels = 3;
 /// A finer image has no more information about the motion: an error of half of its pixels does not
 /// blur it.
 constexpr int kMaxPixels = 400'000;
 constexpr std::size_t kMinEvents = 50;  // of a slice and camera
-constexpr int kMaxPoints = 1000;
 constexpr std::size_t kMinPoints = 100;
 /// The points of a slice and camera count as this many independent ones. Their errors are common:
 /// neighbours lie on the same edge.
@@ -156,8 +155,11 @@ EdgeLevels edgesIn(EventSpan slice, const UndistortionTable& undistortion,
 }
 
 SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& tracked,
-                               const MotionCorrectionOptions& options)
-    : input_(input), options_(options), none_(knotsOf(input.window, kSpacingS)) {
+                               const MotionCorrectionOptions& options, const SliceEffort& effort)
+    : input_(input),
+      options_(options),
+      effort_(effort),
+      none_(knotsOf(input.window, effort.spacing_s)) {
   const std::size_t count = none_.knots.size();
   for (const CameraEvents& camera : input.cameras) {
     views_.push_back(ReferenceView::of(camera.calibration->model));
@@ -165,6 +167,7 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
       ++finest_;
     }
   }
+  finest_ += effort.halvings;
   const Rigid3 T_ref_world = input.T_world_ref.inverse();
   const auto timeOf = [&](std::size_t slice) {
     return input.window.t_ref_ns + durationFromSeconds(none_.sinceReference(slice));
@@ -176,7 +179,7 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
   }
   edges_.resize(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t slice) {
-    const std::int64_t half_ns = durationFromSeconds(kSpacingS / 2);
+    const std::int64_t half_ns = durationFromSeconds(kLengthS / 2);
     for (std::size_t c = 0; c < views_.size() && has_pose_[slice]; ++c) {
       const CameraEvents& camera = input.cameras[c];
       const std::int64_t t_ns = timeOf(slice);
@@ -189,14 +192,14 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
 
 /// Returns the mean speed of the rig, over tenths of a second: noise of single poses is no speed.
 double SliceAlignment::speed() const {
-  constexpr std::size_t kSlices = 10;
+  constexpr double kOverS = 0.1;
+  const auto over = static_cast<std::size_t>(std::max(1.0, kOverS / effort_.spacing_s));
   double path_m = 0;
   double duration_s = 0;
-  for (std::size_t slice = kSlices; slice < has_pose_.size(); slice += kSlices) {
-    if (!has_pose_[slice] || !has_pose_[slice - kSlices]) continue;
-    path_m +=
-        (T_ref_tracked_[slice].translation - T_ref_tracked_[slice - kSlices].translation).norm();
-    duration_s += kSlices * kSpacingS;
+  for (std::size_t slice = over; slice < has_pose_.size(); slice += over) {
+    if (!has_pose_[slice] || !has_pose_[slice - over]) continue;
+    path_m += (T_ref_tracked_[slice].translation - T_ref_tracked_[slice - over].translation).norm();
+    duration_s += static_cast<double>(over) * effort_.spacing_s;
   }
   return duration_s > 0 ? path_m / duration_s : 0;
 }
@@ -204,7 +207,7 @@ double SliceAlignment::speed() const {
 /// Returns evenly chosen points of a depth map, frame `ref`.
 std::vector<Eigen::Vector3d> SliceAlignment::pointsOf(const cv::Mat1f& depth) const {
   std::vector<Eigen::Vector3d> points;
-  const int every = std::max(1, cv::countNonZero(depth > 0) / kMaxPoints);
+  const int every = std::max(1, cv::countNonZero(depth > 0) / effort_.max_points);
   int index = 0;
   for (int y = 0; y < depth.rows; ++y) {
     for (int x = 0; x < depth.cols; ++x) {
@@ -344,10 +347,10 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
   for (const Eigen::Vector3d& point : points) inverse_depth += 1 / point.z();
   inverse_depth /= static_cast<double>(points.size());
   const double sigma_m =
-      kSpacingS * std::max(options_.motion_sigma_m_s, kVelocityError * speed_m_s_);
+      effort_.spacing_s * std::max(options_.motion_sigma_m_s, kVelocityError * speed_m_s_);
   // Errors of position and rotation together keep the image aligned.
-  const double sigma_rad = std::max(kSpacingS * kRadiansPerDegree * options_.motion_sigma_deg_s,
-                                    sigma_m * inverse_depth);
+  const double sigma_rad = std::max(
+      effort_.spacing_s * kRadiansPerDegree * options_.motion_sigma_deg_s, sigma_m * inverse_depth);
   Vector6d sigmas;
   sigmas << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
 

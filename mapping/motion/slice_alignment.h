@@ -28,6 +28,16 @@ using EdgeLevels = std::vector<cv::Mat1b>;
 EdgeLevels edgesIn(EventSpan slice, const UndistortionTable& undistortion,
                    const ReferenceView& view, int finest);
 
+/// The effort of an alignment.
+struct SliceEffort {
+  double spacing_s = 0.01;  ///< Distance of two slices in time.
+  int halvings = 0;         ///< Number of times that the sides of all images are halved.
+  int max_points = 1000;
+
+  /// Returns the effort to see whether a correction is worthwhile: a tenth.
+  static SliceEffort look() { return {0.02, 1, 300}; }
+};
+
 /// A correction of the motion, and what it does to the image.
 struct AlignedMotion {
   MotionCorrection correction;
@@ -48,7 +58,7 @@ class SliceAlignment {
   /// Finds the edges of all slices, in parallel on the threads of the caller's task arena. Memory:
   /// up to 50 MB per camera and second of the window. @param input must outlive this object.
   SliceAlignment(const WindowInput& input, const Trajectory& tracked,
-                 const MotionCorrectionOptions& options);
+                 const MotionCorrectionOptions& options, const SliceEffort& effort = {});
 
   /// @param depth of the input's view, metres; 0: no depth.
   /// @param start of the search.
@@ -70,6 +80,7 @@ class SliceAlignment {
 
   const WindowInput& input_;
   const MotionCorrectionOptions& options_;
+  SliceEffort effort_;
   MotionCorrection none_;
   std::vector<ReferenceView> views_;  // of each camera, without distortion
   int finest_ = 0;

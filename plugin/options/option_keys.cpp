@@ -74,10 +74,11 @@ double degreesThatReadAs(double angle_rad) {
 }
 
 // Functions that read the names of choices. The error of an unknown name shows the name.
-constexpr auto kChoices = std::make_tuple(
-    keyframePolicyFromName, referenceTimeFromName, planeSpacingFromName, fusionRuleFromName,
-    fusionOrderFromName, subintervalSplitFromName, subintervalShuffleFromName,
-    extractionMethodFromName, votingKernelFromName, consistencyFromName);
+constexpr auto kChoices =
+    std::make_tuple(keyframePolicyFromName, referenceTimeFromName, planeSpacingFromName,
+                    fusionRuleFromName, fusionOrderFromName, subintervalSplitFromName,
+                    subintervalShuffleFromName, extractionMethodFromName, votingKernelFromName,
+                    consistencyFromName, motionCorrectionUseFromName);
 
 template <typename Field>
 constexpr bool kIsOptional = false;

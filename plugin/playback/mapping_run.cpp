@@ -213,6 +213,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   status.counts.sorted_events += read.sorted_events;
   report.skipped_events = read.skipped_events;
   report.counts = status.counts;
+  report.motion = motionText(status, options);
   report.silent_keyframes = status.silent_keyframes;
   report.live = status.live;
   report.options = options_;
@@ -238,6 +239,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   findings.options = &options;
   findings.depths = &depths_;
   append(report.warnings, warningsOf(findings));
+  dropExplainedBlur(report.warnings);
   if (status.counts.event_uses > 0 || error_ || stopped) return;
   const bool outside = !status.events && !recording_.rig().cameras.empty() &&
                        (options.interval().t0_ns || options.interval().t1_ns);

@@ -118,6 +118,7 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options);
 inline EventFusionOptions defaultOptions() {
   EventFusionOptions options;
   options.automatic = {true, true, true, true, true};
+  options.mapper.keyframe.motion.correct_motion = MotionCorrectionUse::kAuto;
   return options;
 }
 

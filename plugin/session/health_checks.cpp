@@ -172,6 +172,7 @@ std::optional<TimeSpan> Findings::events() const {
 std::vector<Warning> warningsOf(const Findings& findings) {
   Warnings warnings;
   for (const Check check : kChecks) check(findings, warnings);
+  dropExplainedBlur(warnings);
   return warnings;
 }
 

@@ -132,6 +132,16 @@ OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions&
 /// Returns the error of an interval without events: it names the times of the nearest events.
 std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts);
 
+/// Returns what was found and done about the motion within the windows; empty: nothing was looked
+/// at.
+std::string motionText(const SessionStatus& status, const FusionMapperOptions& options);
+/// Warns if the poses blur the events: `poses-blur`. @return std::nullopt if they do not.
+std::optional<Warning> blurWarning(const SessionStatus& status, const FusionMapperOptions& options);
+
+/// Removes `poses-blur` if a warning beside it names a mistake of the poses: wrong poses blur the
+/// events, too.
+void dropExplainedBlur(std::vector<Warning>& warnings);
+
 /// Returns the warning about wrong poses, with the option or file that fixes them.
 /// @param rig with which the mistake was found.
 Warning poseWarning(const PoseFinding& finding, const Rig& rig);

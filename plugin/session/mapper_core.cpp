@@ -162,10 +162,14 @@ FusionMapperOptions MapperCore::usedOptions() const {
   return session_.usedOptions();
 }
 
-/// Warns of an input that made no keyframe, and lets `warnings` say so from now on.
+/// Warns of an input that made no keyframe or whose poses blur the events, and lets `warnings` say
+/// so from now on.
 void MapperCore::noteEnd(std::exception_ptr& error) {
   if (const auto warning = noKeyframe(status(), usedOptions())) {
     warn(warning->name + ": " + warning->text, error);
+  }
+  for (const Warning& warning : warnings()) {
+    if (warning.name == "poses-blur") warn(warning.name + ": " + warning.text, error);
   }
 }
 
@@ -456,13 +460,21 @@ void MapperCore::publishState(std::exception_ptr& error) {
   SessionStatus status;
   FusionMapperOptions used;
   bool is_new_choice = false;
+  bool is_first_blur = false;
   {
     const std::lock_guard<std::mutex> lock(session_mutex_);
     const std::uint64_t choices = session_.chosen().choices;
     is_new_choice = std::exchange(logged_choices_, choices) != choices;
-    if (!queue_ && !is_new_choice) return;
+    const bool blurs = session_.correctedKeyframes() > 0;
+    is_first_blur = blurs && !std::exchange(blur_logged_, true);
+    if (!queue_ && !is_new_choice && !is_first_blur) return;
     status = session_.status();
     used = session_.usedOptions();
+  }
+  if (is_first_blur) {
+    callBack(error, "the callback of the log", [&] {
+      if (callbacks_.info) callbacks_.info(motionText(status, used));
+    });
   }
   if (is_new_choice) {
     callBack(error, "the callback of the log", [&] {

@@ -131,6 +131,7 @@ class MapperCore {
   std::set<std::thread::id> delivering_;  // threads that are in a callback in playback
   std::set<int> silent_cameras_;          // cameras without events that were logged
   std::uint64_t logged_choices_ = 0;
+  bool blur_logged_ = false;
   bool finished_ = false;
 
   // Members of the mapper's thread.

@@ -102,6 +102,10 @@ class MappingSession {
   };
   Chosen chosen() const { return {newest_planes_.value_or(planes()), status_.choices}; }
   SessionStatus status() const;
+  /// Returns the number of keyframes whose motion was corrected.
+  std::uint64_t correctedKeyframes() const {
+    return earlier_counts_.motion.corrected + mapper_.correctedKeyframes();
+  }
   /// Returns the options in use; automatic options have their chosen values.
   const FusionMapperOptions& usedOptions() const { return options_.mapper; }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
@@ -241,8 +243,69 @@ void checkSession(const Findings& findings, Warnings& warnings) {
   addSilence(status, findings.options->keyframe.exclude_silent, warnings);
   addUnusedPoses(status, warnings);
   addKeyframes(status, warnings);
+  if (const auto warning = blurWarning(status, *findings.options)) warnings.push_back(*warning);
   addLosses(status, warnings);
   if (status.scene_unknown) warnings.push_back(noSceneWarning());
+}
+
+std::string motionText(const SessionStatus& status, const FusionMapperOptions& options) {
+  const MotionCounts& motion = status.counts.motion;
+  if (motion.known == 0) return "";
+  const std::string use(nameOf(options.keyframe.motion.correct_motion));
+  const std::string blur =
+      fmt::format("the poses blur the events by {:.1f} pixels", motion.meanBlurPx());
+  if (motion.corrected == 0) {
+    return fmt::format("correct_motion = {}: no motion was corrected; {} in {} of {} keyframes",
+                       use, blur, motion.known, status.counts.keyframes);
+  }
+  return fmt::format(
+      "correct_motion = {}: the motion of {} of {} keyframes was corrected, as {}; they are {:.2f} "
+      "times as sharp",
+      use, motion.corrected, status.counts.keyframes, blur, motion.meanGain());
+}
+
+std::optional<Warning> blurWarning(const SessionStatus& status,
+                                   const FusionMapperOptions& options) {
+  const MotionCounts& motion = status.counts.motion;
+  // One camera: blur of exact poses up to 0.6 pixels on average, of typical trackers 1.3 and more.
+  // Several cameras: the correction was worthwhile in most keyframes, or it was not.
+  constexpr double kBlurOfOnePx = 0.9;
+  if (selectedCameras(status.rig, options.cameras).size() == 1) {
+    if (motion.known == 0 || motion.meanBlurPx() < kBlurOfOnePx) return std::nullopt;
+    return Warning{
+        "poses-blur",
+        fmt::format("the poses blur the events by {:.1f} pixels within a window: with one camera "
+                    "this cannot be corrected, because wrong depths explain a wrong motion, and a "
+                    "quarter to half of the points may be off by more than 10 %; a second camera, "
+                    "or a tracker with an IMU, helps",
+                    motion.meanBlurPx())};
+  }
+  if (2 * motion.corrected <= motion.known) return std::nullopt;
+  return Warning{
+      "poses-blur",
+      fmt::format("the poses blur the events by {:.1f} pixels within a window, and the motion of "
+                  "{} of {} keyframes was corrected ([refinement] correct_motion): they are {:.2f} "
+                  "times as sharp{}",
+                  motion.meanBlurPx(), motion.corrected, status.counts.keyframes, motion.meanGain(),
+                  status.refinement ? ""
+                                    : "; their own poses have such errors, too: --set "
+                                      "refinement.enabled=true corrects them")};
+}
+
+void dropExplainedBlur(std::vector<Warning>& warnings) {
+  constexpr std::string_view kMistakes[] = {
+      "poses-inverted", "quaternion-order",  "cameras-swapped", "axis-convention",
+      "time-shift",     "poses-unexplained", "depths-disagree", "scale",
+      "long-lever",     "no-motion",         "rotation-only",   "speed",
+      "rotation-rate",  "pose-jump",         "poses-frozen",    "pose-interpolation"};
+  const auto isMistake = [&](const Warning& warning) {
+    return std::find(std::begin(kMistakes), std::end(kMistakes), warning.name) !=
+           std::end(kMistakes);
+  };
+  if (std::none_of(warnings.begin(), warnings.end(), isMistake)) return;
+  warnings.erase(std::remove_if(warnings.begin(), warnings.end(),
+                                [](const Warning& w) { return w.name == "poses-blur"; }),
+                 warnings.end());
 }
 
 Warning noSceneWarning() {

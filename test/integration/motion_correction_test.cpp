@@ -34,7 +34,8 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
   static KeyframeDepthMap map(const Trajectory& trajectory, bool correct_motion) {
     KeyframeMapperOptions options;
     options.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
-    options.motion.correct_motion = correct_motion;
+    options.motion.correct_motion =
+        correct_motion ? MotionCorrectionUse::kAlways : MotionCorrectionUse::kNever;
     options.motion.motion_rounds = 3;
     KeyframeMapper mapper(desk().simulation().rig, {0, 1}, options);
     std::vector<EventSpan> events;

@@ -99,7 +99,7 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
 void mapWindows(Outcomes& outcomes, const Recording& recording, const TrackerError& error,
                 const std::vector<Window>& windows, const KeyframeMapperOptions& options) {
   KeyframeMapperOptions correcting = options;
-  correcting.motion.correct_motion = true;
+  correcting.motion.correct_motion = MotionCorrectionUse::kAlways;
   Recording wrong = error.sway ? withPoseSway(recording, *error.sway) : recording;
   RandomNumbers random(recording.simulation.seed);
   for (const Window& window : windows) {

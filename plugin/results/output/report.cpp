@@ -244,6 +244,12 @@ std::string reportJson(const MapReport& report) {
   if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
   if (!report.doubts.empty()) json["doubtful"] = report.doubts;
+  if (const MotionCounts& motion = report.counts.motion; motion.known > 0) {
+    json["motion"] = {{"known", motion.known},
+                      {"corrected", motion.corrected},
+                      {"blur_px", motion.meanBlurPx()},
+                      {"sharpness_gain", motion.meanGain()}};
+  }
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
@@ -358,6 +364,7 @@ std::string summaryOf(const MapReport& report, OutputKind kind,
   const EventCounts events = report.counts.total();
   if (events.read > 0) addLine(text, "events", eventsText(events));
   addLine(text, "time", timeLine(report));
+  if (!report.motion.empty()) addLine(text, "motion", report.motion);
   if (report.pose_shift) addLine(text, "refinement", shiftText(*report.pose_shift));
   if (!report.chosen.empty()) addLine(text, "chosen", chosenText(report.chosen));
   for (const Warning& warning : report.warnings) {

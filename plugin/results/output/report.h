@@ -63,6 +63,7 @@ struct MapReport {
   std::vector<ChosenOption> chosen;           ///< The automatic options.
   TrackerFaults faults;                       ///< The faults of the perturbed poses.
   std::optional<RefinementState> refinement;  ///< The refinement, if poses were refined.
+  std::string motion;                         ///< `motionText`.
   std::optional<PoseShift> pose_shift;        ///< The shift by the refinement.
   /// The value of `max_confidence = sequence`, if a first pass found it.
   std::optional<double> sequence_maximum;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <utility>
@@ -382,7 +383,8 @@ TEST(MapperCounts, AddUpNumberByNumber) {
                             29,
                             30,
                             31,
-                            32};
+                            32,
+                            {33, 34, 0.5, std::log(2)}};
   MapperCounts sum = counts;
   sum += counts;
   const std::vector<std::uint64_t> numbers = numbersOf(sum);
@@ -390,7 +392,11 @@ TEST(MapperCounts, AddUpNumberByNumber) {
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], 2 * (i + 1));
   EXPECT_EQ(counts.dropped_windows.total(), 21U + 22 + 23 + 24 + 25 + 26 + 27 + 28);
   sum.cameras.resize(2);
-  sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, 0};
+  EXPECT_EQ(sum.motion.known, 66U);
+  EXPECT_EQ(sum.motion.corrected, 68U);
+  EXPECT_DOUBLE_EQ(sum.motion.blur_px, 1);
+  EXPECT_DOUBLE_EQ(sum.motion.log_gain, 2 * std::log(2));
+  sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, 0, {}};
   EXPECT_EQ(sum.total()[EventFate::kOverBudget], 17U);
   EXPECT_EQ(sum.total().read, 3U);
 }

@@ -103,6 +103,35 @@ TEST(MotionCorrectionKnots, MoveTheTrajectory) {
       correctedTrajectory(gap, window, correction).poseAt(window.t_ref_ns + 2 * kMillisecond));
 }
 
+TEST(BlurWatch, IsOnByTheMedianOfThreeAndLooksNowAndThen) {
+  BlurWatch watch;
+  const auto windowsUntilDue = [&] {
+    int windows = 0;
+    for (; !watch.isDue(); ++windows) watch.add(std::nullopt);
+    return windows;
+  };
+  EXPECT_FALSE(watch.isOn());
+  EXPECT_TRUE(watch.isDue());
+  watch.add(2.0);
+  EXPECT_TRUE(watch.isOn());
+  watch.setLast(0);  // the correction did not help
+  EXPECT_FALSE(watch.isOn());
+  EXPECT_EQ(windowsUntilDue(), 3);
+  watch.add(0.2);
+  EXPECT_EQ(windowsUntilDue(), 3);
+  watch.add(2.0);
+  EXPECT_FALSE(watch.isOn()) << "0, 0.2, 2";
+  EXPECT_EQ(windowsUntilDue(), 0) << "it may be on soon";
+  watch.add(0.7);
+  EXPECT_FALSE(watch.isOn()) << "0.2, 2, 0.7";
+  watch.add(0.8);
+  EXPECT_TRUE(watch.isOn()) << "2, 0.7, 0.8";
+  watch.add(0.3);
+  watch.add(0.3);
+  EXPECT_FALSE(watch.isOn()) << "0.8, 0.3, 0.3";
+  EXPECT_EQ(windowsUntilDue(), 7);
+}
+
 TEST(CentralPart, HasTheEventsAroundTheReferenceTime) {
   std::vector<Event> events;
   for (int i = 0; i < 100; ++i) events.push_back({i * kMillisecond, 0, 0, true});
@@ -124,7 +153,8 @@ KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   KeyframeMapperOptions options;
   options.planes = {0.7, 5.0, 60, PlaneSpacing::kInverse};
   options.sweep.threads = threads;
-  options.motion.correct_motion = correct_motion;
+  options.motion.correct_motion =
+      correct_motion ? MotionCorrectionUse::kAlways : MotionCorrectionUse::kNever;
   return options;
 }
 
@@ -304,6 +334,27 @@ TEST(MotionCorrection, ABlurredKeyframeIsMappedAlongTheCorrectedMotionAndBecomes
     PlaneCounter expected;
     expectSame(map(recording, recording.cameras(), options(false), &expected), after);
     EXPECT_DOUBLE_EQ(counted.sum, expected.sum);
+  }
+}
+
+/// With `auto`, blurred keyframes are those of a correction, and sharp ones those without. A single
+/// camera is looked at, but never corrected.
+TEST(MotionCorrection, ByAutoIsForBlurredKeyframesOfSeveralCameras) {
+  KeyframeMapperOptions watching = options(false);
+  watching.motion.correct_motion = MotionCorrectionUse::kAuto;
+  for (const int cameras : {1, 2}) {
+    for (const bool blurs : {false, true}) {
+      const MovingEdges recording = blurs ? blurred(cameras) : MovingEdges(cameras);
+      const KeyframeDepthMap found = map(recording, recording.cameras(), watching);
+      const bool corrects = blurs && cameras > 1;
+      EXPECT_EQ(found.motion_correction.has_value(), corrects);
+      expectSame(map(recording, recording.cameras(), options(corrects)), found);
+      ASSERT_TRUE(found.blur_px);
+      EXPECT_EQ(found.sharpness_gain > 1, corrects);
+      if (corrects) {
+        EXPECT_GT(*found.blur_px, 0.45);
+      }
+    }
   }
 }
 

@@ -161,6 +161,7 @@ const std::map<std::string, std::string> kOtherValues = {
     {"max_confidence", "sequence"},
     {"consistency", "support"},
     {"kernel", "plain"},
+    {"correct_motion", "true"},
 };
 
 std::string otherValue(const NamedOption& option) {

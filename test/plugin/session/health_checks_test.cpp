@@ -508,6 +508,16 @@ TEST(HealthChecks, DepthsThatRestOnLittleEvidenceAreDoubted) {
   EXPECT_THAT(doubtsOf(2.1, 8, 500), ElementsAre(HasSubstr("50 % to the farthest, 5 m")));
 }
 
+TEST(HealthChecks, AMistakeOfThePosesExplainsTheirBlur) {
+  std::vector<Warning> warnings = {{"sorted-events", ""}, {"poses-blur", ""}};
+  dropExplainedBlur(warnings);
+  EXPECT_EQ(warnings.size(), 2U);
+  warnings.push_back({"scale", ""});
+  dropExplainedBlur(warnings);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(warnings[1].name, "scale");
+}
+
 TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
   const SessionStatus sound = [] {
     SessionStatus status;
@@ -545,6 +555,15 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     return [change](SessionStatus& status, auto&) {
       status.live.emplace().cameras[1].received = 200;
       change(status);
+    };
+  };
+  const auto blurred = [](std::size_t cameras, std::uint64_t known, double px,
+                          std::uint64_t corrected) {
+    return [=](SessionStatus& status, auto&) {
+      status.rig.cameras.resize(cameras);
+      const auto count = static_cast<double>(known);
+      status.counts.motion = {known, corrected, px * count,
+                              std::log(2) * static_cast<double>(corrected)};
     };
   };
   const Row rows[] = {
@@ -586,6 +605,17 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        }),
        "refinement-failures: the refinement failed 2 times, the last time with: why;"},
       {refined([](auto& r) { r.counts.failed_solves = 3; }), "failed-solves: 3 failed solves of"},
+      {blurred(2, 5, 0.5, 0), ""},
+      {blurred(2, 4, 1.5, 2), ""},
+      {blurred(2, 4, 1.5, 3),
+       "poses-blur: the poses blur the events by 1.5 pixels within a window, and the motion of 3 "
+       "of "
+       "7 keyframes was corrected ([refinement] correct_motion): they are 2.00 times as sharp; "
+       "their own poses have such errors, too: --set refinement.enabled=true corrects them"},
+      {blurred(1, 3, 0.8, 0), ""},
+      {blurred(1, 3, 1.2, 0),
+       "poses-blur: the poses blur the events by 1.2 pixels within a window: with one camera this "
+       "cannot be corrected, because wrong depths explain a wrong motion"},
       {[](auto& s, auto&) { s.scene_unknown = true; }, "no-scene: "},
       {live([](auto&) {}), ""},
       {live([](auto& s) {
