@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/keyframe_refiner.h"
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -156,7 +158,8 @@ KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
 }
 
 void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
-                          const std::optional<PoseNoise>& stated) {
+                          const std::optional<PoseNoise>& stated,
+                          const std::optional<Rigid3>& T_last_ref) {
   const std::size_t number = graph_.keyframes.size();
   requireUsable(T_odom_ref, stated);
   RefinedKeyframe keyframe{std::move(cloud), T_odom_ref, T_odom_ref, T_odom_ref};
@@ -167,7 +170,7 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
   if (number == 0) return;
   const std::uint64_t registered = registered_;
   try {
-    refineNewest();
+    refineNewest(T_last_ref);
   } catch (...) {
     registered_ = registered;
     dropNewestPoints();
@@ -175,8 +178,9 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
   }
 }
 
-void KeyframeRefiner::refineNewest() {
+void KeyframeRefiner::refineNewest(const std::optional<Rigid3>& T_last_ref) {
   const std::size_t number = graph_.newest();
+  if (T_last_ref) useCommonEvents(*T_last_ref);
   const auto window = static_cast<std::size_t>(options_.window);
   if (number > window) {
     graph_.keyframes[number - window - 1].cloud.releaseTree();
@@ -209,6 +213,74 @@ void KeyframeRefiner::predict(const RefinedKeyframe& last, RefinedKeyframe& keyf
   keyframe.path_length_m = last.path_length_m + T_last_ref.translation.norm();
 }
 
+namespace {
+
+/// Returns the information about a small motion of a keyframe that moves its points in the image by
+/// one pixel: the mean over its points. 0 without points.
+Matrix6d informationOfPixel(const RegistrationCloud& cloud) {
+  Matrix6d sum = Matrix6d::Zero();
+  for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
+    const Eigen::Vector3d p_ref = cloud.points()[i].p_ref.cast<double>();
+    Eigen::Matrix<double, 2, 3> by_point;
+    by_point << 1, 0, -p_ref.x() / p_ref.z(), 0, 1, -p_ref.y() / p_ref.z();
+    by_point *= cloud.focalPx() / p_ref.z();
+    Eigen::Matrix<double, 2, 6> by_motion;
+    by_motion << -by_point, by_point * crossMatrix(p_ref);
+    sum += by_motion.transpose() * by_motion;
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, cloud.numQueryPoints()));
+}
+
+bool isPlausible(const Registration& registration) {
+  return registration.inliers >= kMinPairs && registration.inlierRatio() >= kMinPairedFraction &&
+         registration.from_prior <= kMaxPriorSigmas;
+}
+
+}  // namespace
+
+/// Adds the motion since the last keyframe that the events of both windows show, and starts from
+/// it.
+void KeyframeRefiner::useCommonEvents(const Rigid3& T_last_ref) {
+  // Slices of 10 ms lie within 0.3 pixels of the depth map, in six directions.
+  constexpr double kSigmaPx = 0.3;
+  const std::size_t number = graph_.newest();
+  RefinedKeyframe& newest = graph_.keyframes[number];
+  const RefinedKeyframe& last = graph_.keyframes[number - 1];
+  const Matrix6d information = 6 / (kSigmaPx * kSigmaPx) * informationOfPixel(newest.cloud);
+  if (information.isZero(0)) return;
+  RelativePoseFactor factor{number - 1, number, T_last_ref};
+  factor.sqrt_information =
+      Eigen::LLT<Matrix6d>(information + 1e-6 * Matrix6d::Identity()).matrixU();
+  newest.T_world_ref = last.T_world_ref * T_last_ref;
+  graph_.factors.push_back(factor);
+  graph_.tracker.addSample(factor, last, newest);
+}
+
+/// Registers the newest keyframe, if its points are not found, once more with points that are
+/// farther apart.
+Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map,
+                                             const Matrix6d& covariance) const {
+  const std::size_t number = graph_.newest();
+  const RefinedKeyframe& newest = graph_.keyframes[number];
+  const auto registered = [&](const Rigid3& T_world_ref, double sigmas,
+                              const KeyframeRegistrationOptions& options) {
+    const Matrix6d wider = sigmas * sigmas * covariance;
+    return registerKeyframe(number, newest.cloud, map, {T_world_ref, sqrtInformation(wider)},
+                            options);
+  };
+  Registration near = registered(newest.T_world_ref, 1, options_.registration);
+  if (isPlausible(near)) return near;
+  constexpr double kWider = 2.5;  // 2 pixels become 5
+  constexpr double kSigmas = 5;
+  KeyframeRegistrationOptions wider = options_.registration;
+  wider.first_distance_px *= 2;
+  wider.last_distance_px *= kWider;
+  const Registration wide = registered(newest.T_world_ref, kSigmas, wider);
+  if (!isPlausible(wide)) return near;
+  near = registered(wide.T_world_ref, kSigmas, options_.registration);
+  return near;
+}
+
 void KeyframeRefiner::registerNewest() {
   const std::size_t number = graph_.newest();
   RefinedKeyframe& newest = graph_.keyframes[number];
@@ -223,14 +295,9 @@ void KeyframeRefiner::registerNewest() {
   const Matrix6d covariance =
       errors.noiseCovariance() + errors.noiseCovariance(newest.noise_scale) +
       errors.driftCovariance(newest.path_length_m - graph_.keyframes[number - 1].path_length_m);
-  const Registration registration =
-      registerKeyframe(number, newest.cloud, map, {newest.T_world_ref, sqrtInformation(covariance)},
-                       options_.registration);
+  const Registration registration = registrationOf(map, covariance);
   graph_.failed_solves += registration.failed_solves;
-  if (registration.inliers < kMinPairs || registration.inlierRatio() < kMinPairedFraction ||
-      registration.from_prior > kMaxPriorSigmas) {
-    return;
-  }
+  if (!isPlausible(registration)) return;
   ++registered_;
   newest.T_world_ref = registration.T_world_ref;
   for (const RelativePoseFactor& factor : registration.factors) {

@@ -99,11 +99,13 @@ class KeyframeRefiner {
   /// Adds the next keyframe. Numbers count from 0.
   /// @param stated the noise of this pose as the tracker states it. It replaces the expected noise.
   /// If errors are learnt, it is corrected by the same factor.
+  /// @param T_last_ref pose relative to the last keyframe by events that both windows have.
   /// @throws std::invalid_argument as `requireUsable`. Then the keyframe is not added. After any
   /// other error, `keyframes` shows whether it was added. If so, it has lost its points, and keeps
   /// the tracker's motion. In both cases the next keyframe may be added.
   void add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
-           const std::optional<PoseNoise>& stated = std::nullopt);
+           const std::optional<PoseNoise>& stated = std::nullopt,
+           const std::optional<Rigid3>& T_last_ref = std::nullopt);
   /// Checks a loop that the caller proposes.
   /// @return whether it was verified.
   bool propose(const LoopCandidate& candidate);
@@ -133,9 +135,12 @@ class KeyframeRefiner {
 
  private:
   static void predict(const RefinedKeyframe& last, RefinedKeyframe& keyframe);
-  void refineNewest();
+  void refineNewest(const std::optional<Rigid3>& T_last_ref);
   void dropNewestPoints();
+  void useCommonEvents(const Rigid3& T_last_ref);
   void registerNewest();
+  Registration registrationOf(const std::vector<MapKeyframe>& map,
+                              const Matrix6d& covariance) const;
   void updateCovariance(const WindowGraph& solved);
 
   RefinementOptions options_;

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -34,6 +35,31 @@ Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
          state.tracker.driftCovariance(lever_m.norm());
 }
 
+WindowMotion::WindowMotion(const KeyframeDepthMap& keyframe)
+    : t_ref_ns(keyframe.window.t_ref_ns),
+      T_world_ref(keyframe.T_world_ref),
+      T_rig_ref(keyframe.T_rig_ref),
+      correction(keyframe.motion_correction) {}
+
+std::optional<Rigid3> motionBetween(const WindowMotion& from, const WindowMotion& to) {
+  const Rigid3 T_from_to = from.T_world_ref.inverse() * to.T_world_ref;
+  // A window's correction at another time, in its reference view.
+  const auto correctionAt = [](const WindowMotion& window,
+                               std::int64_t t_ns) -> std::optional<Rigid3> {
+    const double since_s = secondsBetween(window.t_ref_ns, t_ns);
+    if (!window.correction || !window.correction->covers(since_s)) return std::nullopt;
+    return window.T_rig_ref.inverse() * window.correction->displacement(since_s) * window.T_rig_ref;
+  };
+  const std::optional<Rigid3> by_from = correctionAt(from, to.t_ref_ns);
+  const std::optional<Rigid3> by_to = correctionAt(to, from.t_ref_ns);
+  if (by_from && by_to) {
+    return interpolate(T_from_to * *by_from, by_to->inverse() * T_from_to, 0.5);
+  }
+  if (by_from) return T_from_to * *by_from;
+  if (by_to) return by_to->inverse() * T_from_to;
+  return std::nullopt;
+}
+
 MapRefinement::MapRefinement(const MapRefinementOptions& options)
     : options_(options), refiner_(options.refiner) {
   state_.tracker = options.refiner.tracker;
@@ -53,7 +79,10 @@ MapRefinement::~MapRefinement() {
 Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
                           const std::optional<PoseNoise>& stated) {
   KeyframeRefiner::requireUsable(keyframe.T_world_ref, stated);
-  Task task{RegistrationCloud(keyframe, options_.refiner.points), keyframe.T_world_ref, stated};
+  Task task{RegistrationCloud(keyframe, options_.refiner.points), keyframe.T_world_ref, stated, {}};
+  WindowMotion motion(keyframe);
+  if (last_) task.T_last_ref = motionBetween(*last_, motion);
+  last_ = std::move(motion);
   if (!options_.background) {
     if (!refine(task)) std::rethrow_exception(std::exchange(unthrown_, nullptr));
     return refiner_.T_world_ref(refiner_.keyframes() - 1);
@@ -111,7 +140,7 @@ RefinementState MapRefinement::state() const {
 /// @return true if the refiner has the keyframe. Otherwise the task has lost its points.
 bool MapRefinement::refine(Task& task) {
   const std::size_t number = refiner_.keyframes();
-  work([&] { refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated); });
+  work([&] { refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated, task.T_last_ref); });
   task.cloud.clear();
   return refiner_.keyframes() > number;
 }

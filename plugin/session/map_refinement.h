@@ -31,6 +31,21 @@ struct MapRefinementOptions {
 /// over the distance from the keyframe.
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 
+/// What a keyframe's window says about the motion.
+struct WindowMotion {
+  explicit WindowMotion(const KeyframeDepthMap& keyframe);
+
+  std::int64_t t_ref_ns;
+  Rigid3 T_world_ref;  ///< By the tracker.
+  Rigid3 T_rig_ref;
+  std::optional<MotionCorrection> correction;
+};
+
+/// Returns the motion between the reference times of two windows by the events around these times:
+/// the mean of what both windows say.
+/// @return std::nullopt if no window has a corrected motion that reaches the other's time.
+std::optional<Rigid3> motionBetween(const WindowMotion& from, const WindowMotion& to);
+
 /// Refines keyframes one after the other, optionally in a background thread. One thread calls it.
 /// `finish` waits for the refinement; `add` waits only without the background thread. If the
 /// background thread is 50 keyframes behind, further keyframes are added without their points: they
@@ -71,6 +86,7 @@ class MapRefinement {
     RegistrationCloud cloud;
     Rigid3 T_odom_ref;
     std::optional<PoseNoise> stated;
+    std::optional<Rigid3> T_last_ref;
   };
 
   bool refine(Task& task);
@@ -80,6 +96,7 @@ class MapRefinement {
   void runInBackground();
 
   MapRefinementOptions options_;
+  std::optional<WindowMotion> last_;
   KeyframeRefiner refiner_;  // used by the background thread alone, if there is one
 
   mutable std::mutex mutex_;  // guards the members below

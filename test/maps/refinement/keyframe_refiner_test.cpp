@@ -111,6 +111,33 @@ Errors errorsOf(const Poses& estimate, const Poses& truth) {
   return {std::sqrt(squared_m / pairs), std::sqrt(squared_rad / pairs)};
 }
 
+/// A tracker that is wrong by far more than registrations reach: the motions by common events lead
+/// to the true poses, and tell the errors of the tracker.
+TEST(KeyframeRefiner, FollowsTheMotionsByCommonEvents) {
+  std::mt19937 random(3);
+  const Poses truth = circle(12, 5);
+  const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+  const Poses tracked = noisy(truth, 0.15, 4 * kRadiansPerDegree, random);
+  KeyframeRefiner refiner(quick());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    std::optional<Rigid3> T_last_ref;
+    if (i > 0) {
+      T_last_ref =
+          truth[i - 1].inverse() * truth[i] * drawMotion(0.002, 0.05 * kRadiansPerDegree, random);
+    }
+    refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i], std::nullopt, T_last_ref);
+  }
+  refiner.finish();
+  EXPECT_GE(refiner.counts().registered, 10U);
+  const Errors by_tracker = errorsOf(tracked, truth);
+  const Errors refined = errorsOf(posesOf(refiner), truth);
+  const Errors alone = errorsOf(posesOf(refine(seen, tracked, quick())), truth);
+  EXPECT_LT(refined.m, 0.1 * by_tracker.m);
+  EXPECT_LT(refined.rad, 0.1 * by_tracker.rad);
+  EXPECT_LT(refined.m, 0.3 * alone.m);
+  EXPECT_GT(refiner.trackerErrors().noise_m, 0.05);
+}
+
 TEST(KeyframeRefiner, TakesMostOfATrackersNoiseAway) {
   Errors before;
   Errors after;

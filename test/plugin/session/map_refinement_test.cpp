@@ -44,6 +44,53 @@ std::map<std::size_t, Rigid3> refinedAlone(const std::vector<KeyframeDepthMap>& 
   return refiner.takeMoved();
 }
 
+/// A keyframe at `t_ns` of a tracker with a motion error c(t), whose window says what it is.
+KeyframeDepthMap keyframeWith(const std::function<Rigid3(double)>& T_rig_true, std::int64_t t_ns,
+                              const Rigid3& T_rig_ref) {
+  KeyframeDepthMap keyframe;
+  keyframe.window.t_ref_ns = t_ns;
+  keyframe.T_rig_ref = T_rig_ref;
+  keyframe.T_world_ref =
+      Rigid3{Eigen::Quaterniond::Identity(), {1e-9 * double(t_ns), 0, 0}} * T_rig_ref;
+  MotionCorrection& correction = keyframe.motion_correction.emplace();
+  correction.spacing_s = 0.1;
+  correction.reference = 3;
+  for (std::size_t i = 0; i < 7; ++i) {
+    // Relative to the error at the reference time, which the keyframe keeps.
+    const double since_s = correction.sinceReference(i);
+    const Rigid3 c = T_rig_true(1e-9 * double(t_ns) + since_s);
+    correction.knots.emplace_back();
+    correction.knots.back() << c.translation - T_rig_true(1e-9 * double(t_ns)).translation,
+        Eigen::Vector3d::Zero();
+  }
+  return keyframe;
+}
+
+TEST(MotionBetween, IsThatOfTheEventsOfBothWindows) {
+  const auto error = [](double t_s) {
+    return Rigid3{Eigen::Quaterniond::Identity(), {0, 0.3 * t_s * t_s, 0}};
+  };
+  const Rigid3 T_rig_ref{rotationBy({0, 0, kPi / 2}), {0.2, 0, 0}};
+  const KeyframeDepthMap a = keyframeWith(error, 0, T_rig_ref);
+  const KeyframeDepthMap b = keyframeWith(error, 200'000'000, T_rig_ref);
+  const KeyframeDepthMap far = keyframeWith(error, 400'000'000, T_rig_ref);
+  KeyframeDepthMap without = b;
+  without.motion_correction.reset();
+  // In 0.2 s the tracker moves by 0.2 m along x, and its error by 0.012 m along y of the rig. The
+  // view is turned: the rig's x is its -y, the rig's y is its x.
+  const Eigen::Vector3d expected(0.012, -0.2, 0);
+  for (const KeyframeDepthMap* to : {&b, static_cast<const KeyframeDepthMap*>(&without)}) {
+    const auto motion = motionBetween(WindowMotion(a), WindowMotion(*to));
+    ASSERT_TRUE(motion);
+    EXPECT_LT((motion->translation - expected).norm(), 1e-9);
+  }
+  const auto by_to = motionBetween(WindowMotion(without), WindowMotion(far));
+  ASSERT_TRUE(by_to);
+  EXPECT_NEAR(by_to->translation.x(), 0.3 * (0.16 - 0.04), 1e-9);
+  EXPECT_FALSE(motionBetween(WindowMotion(a), WindowMotion(far))) << "0.4 s apart, 0.3 s known";
+  EXPECT_FALSE(motionBetween(WindowMotion(without), WindowMotion(without)));
+}
+
 class MapRefinementInEitherMode : public testing::TestWithParam<bool> {};
 
 INSTANTIATE_TEST_SUITE_P(Background, MapRefinementInEitherMode, testing::Bool());
