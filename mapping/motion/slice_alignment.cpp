@@ -41,17 +41,16 @@ struct Step {
 std::vector<Step> schedule() {
   constexpr int kReaching = 8;
   std::vector<Step> steps;
-  for (int i = 1; i <= kReaching; ++i) steps.push_back({2, double{1} * i / kReaching});
+  for (int i = 1; i <= kReaching; ++i) steps.push_back({2, static_cast<double>(i) / kReaching});
   for (const std::size_t level : {1, 1, 0, 0, 0}) steps.push_back({level});
   return steps;
 }
 
 /// Returns the motion as numbers of `MotionCorrection`.
 Vector6d numbersOf(const Rigid3& motion) {
-  const Eigen::AngleAxisd turn(motion.rotation);
-  const double angle = turn.angle() > kPi ? turn.angle() - 2 * kPi : turn.angle();
+  const Eigen::AngleAxisd turn(motion.rotation);  // 0 to pi, for either sign of the quaternion
   Vector6d numbers;
-  numbers << motion.translation, angle * turn.axis();
+  numbers << motion.translation, turn.angle() * turn.axis();
   return numbers;
 }
 

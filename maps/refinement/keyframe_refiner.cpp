@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/keyframe_refiner.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -249,8 +247,7 @@ void KeyframeRefiner::useCommonEvents(const Rigid3& T_last_ref) {
   const Matrix6d information = 6 / (kSigmaPx * kSigmaPx) * informationOfPixel(newest.cloud);
   if (information.isZero(0)) return;
   RelativePoseFactor factor{number - 1, number, T_last_ref};
-  factor.sqrt_information =
-      Eigen::LLT<Matrix6d>(information + 1e-6 * Matrix6d::Identity()).matrixU();
+  factor.sqrt_information = sqrtInformation(inverseOf(information + 1e-6 * Matrix6d::Identity()));
   newest.T_world_ref = last.T_world_ref * T_last_ref;
   graph_.factors.push_back(factor);
   graph_.tracker.addSample(factor, last, newest);
@@ -268,7 +265,7 @@ Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map
     return registerKeyframe(number, newest.cloud, map, {T_world_ref, sqrtInformation(wider)},
                             options);
   };
-  Registration near = registered(newest.T_world_ref, 1, options_.registration);
+  const Registration near = registered(newest.T_world_ref, 1, options_.registration);
   if (isPlausible(near)) return near;
   constexpr double kWider = 2.5;  // 2 pixels become 5
   constexpr double kSigmas = 5;
@@ -277,8 +274,7 @@ Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map
   wider.last_distance_px *= kWider;
   const Registration wide = registered(newest.T_world_ref, kSigmas, wider);
   if (!isPlausible(wide)) return near;
-  near = registered(wide.T_world_ref, kSigmas, options_.registration);
-  return near;
+  return registered(wide.T_world_ref, kSigmas, options_.registration);
 }
 
 void KeyframeRefiner::registerNewest() {
