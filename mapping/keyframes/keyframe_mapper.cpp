@@ -73,8 +73,6 @@ double sharpnessOf(const KeyframeDepthMap& keyframe) {
 /// Part of a window around the reference time. There the tracker's errors are small, and the depth
 /// of its events has a right scale.
 constexpr double kCentral = 0.2;
-/// Fewest depth planes to look for blur.
-constexpr int kMinPlanes = 25;
 
 }  // namespace
 
@@ -95,13 +93,10 @@ KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map
       // In slow motion the central part may have too few points.
       if (!aligned && round == 0) aligned = align(keyframe.map.depth, std::nullopt);
     }
-    // Less does not blur the DSI. With `auto`, the first round asks for more: exact poses have up
-    // to 0.4 pixels.
-    const bool watches = options.correct_motion == MotionCorrectionUse::kAuto;
-    const double same_motion_px = watches && round == 0 ? 0.45 : 0.25;
     if (!aligned) break;
     if (round == 0) blur_px = 0;
-    if (aligned->shift_px < same_motion_px) break;
+    constexpr double kSameMotionPx = 0.25;  // less does not blur the DSI
+    if (aligned->shift_px < kSameMotionPx) break;
     Trajectory corrected = correctedTrajectory(window.tracked, input.window, aligned->correction);
     KeyframeDepthMap sharper = map_along(input, corrected, nullptr);
     const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
@@ -246,17 +241,18 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
   const auto map_along = [&](const WindowInput& part, const Trajectory& motion, DsiSink* dsi) {
     return mapAlong(part, motion, dsi, stages);
   };
-  const CentralPart central(input, kCentral);
   std::optional<double> looked_px;
+  if (!corrects() && !blur_.isDue()) {
+    blur_.add(looked_px);
+    return mapAlong(input, tracked, sink, stages);
+  }
+  const CentralPart central(input, kCentral);
+  const cv::Mat1f central_depth = map_along(central.input(input), tracked, nullptr).map.depth;
   if (!corrects()) {
-    if (blur_.isDue()) {
-      DepthPlanesOptions coarse = options_.planes;
-      coarse.num_planes = std::min(coarse.num_planes, std::max(kMinPlanes, coarse.num_planes / 4));
-      const DepthPlanes planes(coarse);
-      const cv::Mat1f depth = map_along(central.input(input, planes), tracked, nullptr).map.depth;
+    {
       const StageScope scope(stages, Stage::kSweep);
       const SliceAlignment slices(input, tracked, options_.motion, SliceEffort::look());
-      const std::optional<AlignedMotion> aligned = slices.align(depth, slices.none());
+      const std::optional<AlignedMotion> aligned = slices.align(central_depth, slices.none());
       if (aligned) looked_px = aligned->shift_px;
     }
     blur_.add(looked_px);
@@ -266,8 +262,6 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
       return keyframe;
     }
   }
-  const cv::Mat1f central_depth =
-      map_along(central.input(input, input.planes), tracked, nullptr).map.depth;
   std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
   const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
     if (!slices) slices.emplace(input, tracked, options_.motion);

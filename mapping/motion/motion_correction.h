@@ -69,8 +69,7 @@ Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& windo
                                const MotionCorrection& correction);
 
 /// Decides from the blur of some windows whether the poses blur them: by the median of the last
-/// three. It looks at the first, the fifth and the ninth window, and then at each eighth; and at
-/// the next one if a blur is near the limit.
+/// three. It looks at the first window and then at each eighth, and at the next one after a blur.
 class BlurWatch {
  public:
   /// Returns whether the poses blur the windows.
@@ -96,9 +95,8 @@ struct CentralPart {
 
   /// @param fraction of the window, above 0, at most 1.
   CentralPart(const WindowInput& input, double fraction);
-  /// Returns the input of this part, with these planes.
-  WindowInput input(const WindowInput& of_window, const DepthPlanes& planes) const {
-    return {window, cameras, of_window.view, planes, of_window.T_world_ref};
+  WindowInput input(const WindowInput& of_window) const {
+    return {window, cameras, of_window.view, of_window.planes, of_window.T_world_ref};
   }
 };
 

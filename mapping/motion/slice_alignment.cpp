@@ -166,7 +166,6 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
       ++finest_;
     }
   }
-  finest_ += effort.halvings;
   const Rigid3 T_ref_world = input.T_world_ref.inverse();
   const auto timeOf = [&](std::size_t slice) {
     return input.window.t_ref_ns + durationFromSeconds(none_.sinceReference(slice));

@@ -31,11 +31,11 @@ EdgeLevels edgesIn(EventSpan slice, const UndistortionTable& undistortion,
 /// The effort of an alignment.
 struct SliceEffort {
   double spacing_s = 0.01;  ///< Distance of two slices in time.
-  int halvings = 0;         ///< Number of times that the sides of all images are halved.
   int max_points = 1000;
 
-  /// Returns the effort to see whether a correction is worthwhile: a tenth.
-  static SliceEffort look() { return {0.02, 1, 300}; }
+  /// Returns the effort to see whether a correction is worthwhile: a third. Fewer points or pixels
+  /// would show a blur of exact poses.
+  static SliceEffort look() { return {0.03, 1000}; }
 };
 
 /// A correction of the motion, and what it does to the image.

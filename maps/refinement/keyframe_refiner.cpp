@@ -265,7 +265,7 @@ Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map
     return registerKeyframe(number, newest.cloud, map, {T_world_ref, sqrtInformation(wider)},
                             options);
   };
-  const Registration near = registered(newest.T_world_ref, 1, options_.registration);
+  Registration near = registered(newest.T_world_ref, 1, options_.registration);
   if (isPlausible(near)) return near;
   constexpr double kWider = 2.5;  // 2 pixels become 5
   constexpr double kSigmas = 5;
@@ -273,8 +273,11 @@ Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map
   wider.first_distance_px *= 2;
   wider.last_distance_px *= kWider;
   const Registration wide = registered(newest.T_world_ref, kSigmas, wider);
+  near.failed_solves += wide.failed_solves;
   if (!isPlausible(wide)) return near;
-  return registered(wide.T_world_ref, kSigmas, options_.registration);
+  Registration again = registered(wide.T_world_ref, kSigmas, options_.registration);
+  again.failed_solves += near.failed_solves;
+  return again;
 }
 
 void KeyframeRefiner::registerNewest() {
