@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/recordings/recording_errors.h"
 #include "test/studies/studies.h"
+#include "tracking_stub/faults/tracker_process.h"
 #include "tracking_stub/presets/presets.h"
 #include "tracking_stub/random/random_numbers.h"
 
@@ -26,23 +26,26 @@ struct Case {
   double min_depth_m;
   double max_depth_m;
   double window_s;
+  double middle_depth_m;
 };
 
 /// An error of the tracker.
 struct TrackerError {
   std::string name;
   double velocity = 0;  ///< Error of a constant velocity: cm/s and degrees per second.
-  std::optional<PoseSway> sway;
+  TrackerClass tracker = TrackerClass::kNone;
 };
 
 std::vector<TrackerError> trackerErrors(bool quick) {
-  std::vector<TrackerError> errors = {{"exact", 0, std::nullopt}};
+  std::vector<TrackerError> errors = {{"exact"}};
   for (const double velocity : quick ? std::vector<double>{5} : std::vector<double>{1, 2, 5, 10}) {
     const std::string number = formatNumber(velocity, 0);
-    errors.push_back({number + " cm/s, " + number + "°/s", velocity, std::nullopt});
+    errors.push_back({number + " cm/s, " + number + "°/s", velocity});
   }
-  errors.push_back({"sway of 1 cm, 0.1°", 0, kTrackerSway});
-  if (!quick) errors.push_back({"sway of 1 cm, 1°", 0, PoseSway{0.01, kRadiansPerDegree, 1}});
+  for (const TrackerClass tracker :
+       {TrackerClass::kGood, TrackerClass::kTypical, TrackerClass::kPoor, TrackerClass::kCar}) {
+    errors.push_back({"real, " + std::string(nameOf(tracker)), 0, tracker});
+  }
   return errors;
 }
 
@@ -97,10 +100,21 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
 }
 
 void mapWindows(Outcomes& outcomes, const Recording& recording, const TrackerError& error,
-                const std::vector<Window>& windows, const KeyframeMapperOptions& options) {
+                double middle_depth_m, const std::vector<Window>& windows,
+                const KeyframeMapperOptions& options) {
   KeyframeMapperOptions correcting = options;
   correcting.motion.correct_motion = MotionCorrectionUse::kAlways;
-  Recording wrong = error.sway ? withPoseSway(recording, *error.sway) : recording;
+  Recording wrong = recording;
+  if (error.tracker != TrackerClass::kNone) {
+    const TrackerProcessOptions process{error.tracker, middle_depth_m,
+                                        recording.simulation.rig.cameras.front().T_rig_cam};
+    wrong.trajectory = Trajectory();
+    for (const StampedPose& pose :
+         withTrackerProcess(recording.trajectory.poses(), process,
+                            TrajectoryOptions{}.max_pose_gap_s, 1, recording.simulation.seed)) {
+      wrong.trajectory.add(pose);
+    }
+  }
   RandomNumbers random(recording.simulation.seed);
   for (const Window& window : windows) {
     if (error.velocity > 0) {
@@ -132,7 +146,7 @@ std::vector<Outcomes> outcomesOf(const StudyRun& run, const Case& what,
                              makeSimulation(simulation));
     const auto windows = recording.windows(run.pick(what.window_s, 0.1), run.pick(3, 1));
     for (std::size_t i = 0; i < errors.size(); ++i) {
-      mapWindows(all[i], recording, errors[i], windows, options);
+      mapWindows(all[i], recording, errors[i], what.middle_depth_m, windows, options);
     }
   }
   return all;
@@ -164,7 +178,7 @@ cv::Mat3b draw(const Case& what, const std::vector<TrackerError>& errors,
   plot.y = {"median error [%]", AxisScale::kLinear, 0, {}};
   std::vector<double> velocities, as_is, corrected;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (errors[i].sway) continue;
+    if (errors[i].tracker != TrackerClass::kNone) continue;
     velocities.push_back(errors[i].velocity);
     as_is.push_back(100 * all[i].as_is.median());
     corrected.push_back(100 * all[i].corrected.median());
@@ -203,8 +217,11 @@ void judge(const Case& what, const std::vector<TrackerError>& errors,
 }  // namespace
 
 void studyMotionCorrection(const StudyRun& run, StudySection& section) {
-  std::vector<Case> cases = {{"desk_stereo", 0.5, 5, 0.2}};
-  if (!run.quick) cases.push_back({"room_stereo", 1, 6.5, 0.3});
+  std::vector<Case> cases = {{"desk_stereo", 0.5, 5, 0.2, 1.5}};
+  if (!run.quick) {
+    cases.push_back({"room_stereo", 1, 6.5, 0.3, 4});
+    cases.push_back({"drive_stereo", 4, 50, 0.2, 10});
+  }
   const MotionCorrectionOptions defaults;
   section.text(
       "The paper uses its fused DSI as a measure of refocused events (Sec. 3.4.2) and does not "
@@ -212,9 +229,11 @@ void studyMotionCorrection(const StudyRun& run, StudySection& section) {
       "aligned with the points of the depth map (`[refinement] correct_motion`, up to " +
       std::to_string(defaults.motion_rounds) +
       " rounds). The pose at the reference time does not change. The tracker has a velocity error "
-      "with a random direction in each window, or sways around the truth once a second. Three "
-      "windows each (0.2 s of `desk_stereo`, 0.3 s of `room_stereo`) of seeds 1 to 3, all points "
-      "together; two cameras, the default depth. *Time*: seconds per keyframe, on this machine.");
+      "with a random direction in each window, or the errors of real trackers (`--perturb "
+      "tracker=good` and so on, with the seed of the recording). Three windows each (0.2 s of "
+      "`desk_stereo` and `drive_stereo`, 0.3 s of `room_stereo`) of seeds 1 to 3, all points "
+      "together; two cameras, the default depth, each window corrected. *Time*: seconds per "
+      "keyframe, on this machine.");
   const std::vector<TrackerError> errors = trackerErrors(run.quick);
   TextTable table;
   table.head = {"recording", "tracker",    "poses",           "corrected",
