@@ -267,13 +267,11 @@ std::string motionText(const SessionStatus& status, const FusionMapperOptions& o
 std::optional<Warning> blurWarning(const SessionStatus& status,
                                    const FusionMapperOptions& options) {
   const MotionCounts& motion = status.counts.motion;
-  // One camera: blur of exact poses up to 0.6 pixels on average, of typical trackers 1.3 and more.
-  // Several cameras: the correction was worthwhile in most keyframes, or it was not; the small blur
-  // of good trackers needs no warning.
-  constexpr double kBlurOfOnePx = 0.9;
-  constexpr double kBlurOfSeveralPx = 0.6;
+  // Exact poses have up to 0.35 pixels on average, good hand-held trackers 0.55, typical ones 0.8
+  // or more. Several cameras: and the correction was worthwhile in most keyframes.
+  constexpr double kWorthSayingPx = 0.6;
+  if (motion.known == 0 || motion.meanBlurPx() < kWorthSayingPx) return std::nullopt;
   if (selectedCameras(status.rig, options.cameras).size() == 1) {
-    if (motion.known == 0 || motion.meanBlurPx() < kBlurOfOnePx) return std::nullopt;
     return Warning{
         "poses-blur",
         fmt::format("the poses blur the events by {:.1f} pixels within a window: with one camera "
@@ -282,9 +280,7 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
                     "or a tracker with an IMU, helps",
                     motion.meanBlurPx())};
   }
-  if (2 * motion.corrected <= motion.known || motion.meanBlurPx() < kBlurOfSeveralPx) {
-    return std::nullopt;
-  }
+  if (2 * motion.corrected <= motion.known) return std::nullopt;
   return Warning{
       "poses-blur",
       fmt::format("the poses blur the events by {:.1f} pixels within a window, and the motion of "

@@ -607,12 +607,13 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
       {refined([](auto& r) { r.counts.failed_solves = 3; }), "failed-solves: 3 failed solves of"},
       {blurred(2, 5, 0.5, 0), ""},
       {blurred(2, 4, 1.5, 2), ""},
+      {blurred(2, 4, 0.5, 4), ""},
       {blurred(2, 4, 1.5, 3),
        "poses-blur: the poses blur the events by 1.5 pixels within a window, and the motion of 3 "
        "of "
        "7 keyframes was corrected ([refinement] correct_motion): they are 2.00 times as sharp; "
        "their own poses have such errors, too: --set refinement.enabled=true corrects them"},
-      {blurred(1, 3, 0.8, 0), ""},
+      {blurred(1, 3, 0.5, 0), ""},
       {blurred(1, 3, 1.2, 0),
        "poses-blur: the poses blur the events by 1.2 pixels within a window: with one camera this "
        "cannot be corrected, because wrong depths explain a wrong motion"},
