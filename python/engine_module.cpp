@@ -37,7 +37,6 @@ struct EventRecord {
 
 using Paths = std::vector<std::filesystem::path>;
 using Matrix4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-
 using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
@@ -163,7 +162,7 @@ void checkSignals() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
-/// The events of a recording's camera, or of all, packet by packet.
+/// The events of a recording's camera. At damage, the events before it come first.
 class EventReader {
  public:
   EventReader(const Paths& files, const Overrides& overrides)
@@ -174,7 +173,8 @@ class EventReader {
     std::vector<Event> part;
     {
       const py::gil_scoped_release released;
-      while (waiting_.size() < count && readPacket(camera)) checkSignals();
+      while (!damage_ && waiting_.size() < count && readPacket(camera)) checkSignals();
+      if (damage_ && waiting_.empty()) std::rethrow_exception(damage_);
       const auto end =
           waiting_.begin() + static_cast<std::ptrdiff_t>(std::min(count, waiting_.size()));
       part.assign(waiting_.begin(), end);
@@ -185,7 +185,12 @@ class EventReader {
 
  private:
   bool readPacket(int camera) {
-    const std::optional<Sample> sample = recording_->next();
+    std::optional<Sample> sample;
+    try {
+      sample = recording_->next();
+    } catch (const std::runtime_error&) {
+      damage_ = std::current_exception();
+    }
     if (!sample) return false;
     const auto* packet = std::get_if<EventPacket>(&*sample);
     if (packet != nullptr && packet->camera == camera) {
@@ -196,6 +201,7 @@ class EventReader {
 
   std::unique_ptr<Recording> recording_;
   std::vector<Event> waiting_;
+  std::exception_ptr damage_;
 };
 
 std::vector<StampedPose> readPoses(const Paths& files, const Overrides& overrides) {

@@ -90,6 +90,19 @@ def test_events_come_in_chunks_of_any_size(desk):
     np.testing.assert_array_equal(part, whole[(whole["t"] >= t0) & (whole["t"] < t1)])
 
 
+def test_the_events_before_damage_come_first(tmp_path):
+    lines = [f"{1 + i / 1000:.3f} {i} 5 1\n" for i in range(100)]
+    for camera in ("cam0", "cam1"):
+        (tmp_path / camera).mkdir()
+        (tmp_path / camera / "events.txt").write_text("".join(lines[:90]) + "damage\n" + "".join(lines[91:]))
+    for name in ("camchain.yaml", "poses.txt"):
+        (tmp_path / name).write_text(open(os.path.join(DESK, name)).read())
+    parts = ef.open(tmp_path).events(0, 1000)
+    assert len(next(parts)) > 0
+    with pytest.raises(OSError, match="events.txt"):
+        next(parts)
+
+
 @pytest.mark.parametrize(
     "dtype, unit, per",
     [
