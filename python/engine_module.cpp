@@ -342,10 +342,7 @@ void defineRecordings(py::module_& module) {
 }
 
 void defineMapper(py::module_& module) {
-  py::class_<Options>(module, "Options")
-      .def(py::init<>())
-      .def("set", &Options::set)
-      .def("read", &Options::read);
+  py::class_<Options>(module, "Options").def(py::init<>()).def("set", &Options::set);
   const py::call_guard<py::gil_scoped_release> releases;
   py::class_<Mapper, MapperPointer>(module, "Mapper")
       .def(py::init(&makeMapper), py::arg("options"), py::arg("on_keyframe"))
@@ -364,7 +361,6 @@ void defineMapper(py::module_& module) {
            })
       .def("add_recording", &addRecording, releases)
       .def("finish", &Mapper::finish, releases)
-      .def("stop", &Mapper::stop, releases)
       .def("points", [](const Mapper& mapper) { return pointsOf(mapper.points()); })
       .def("trajectory", [](const Mapper& mapper) { return posesOf(mapper.trajectory()); })
       .def("warnings", [](const Mapper& mapper) {

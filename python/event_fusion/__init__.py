@@ -13,6 +13,7 @@ files: ``{"dsi.max_depth_m": 8}``. Errors of data and files are OSError, wrong a
 from __future__ import annotations
 
 import os
+from functools import cached_property
 from typing import Any, Callable, Iterator, Mapping, Sequence, Union
 
 import numpy as np
@@ -145,9 +146,12 @@ class Recording:
                 return
             yield part
 
-    @property
+    @cached_property
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Poses of the rig: times (n,), int64, nanoseconds, and T_world_rig (n, 4, 4), float64."""
+        """Poses of the rig: times (n,), int64, nanoseconds, and T_world_rig (n, 4, 4), float64.
+
+        Read once, at the first use: this reads the whole recording.
+        """
         return _engine.read_poses(self._files, self._overrides)
 
 
