@@ -14,6 +14,7 @@ inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kRadiansPerDegree = kPi / 180;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
 /// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
@@ -54,6 +55,13 @@ inline Eigen::Quaterniond rotationBy(const Eigen::Vector3d& rotation_vector) {
   if (angle <= 0) return Eigen::Quaterniond::Identity();
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
+
+/// Returns the motion T_a_b as six numbers: the translation in metres, then the rotation vector
+/// (axis times angle, at most pi) in radians. Covariances and informations have the same order.
+Vector6d differenceOf(const Rigid3& T_a_b);
+
+/// Inverts `differenceOf`.
+Rigid3 rigidFromDifference(const Vector6d& difference);
 
 /// Functions for rotations and transforms from files, whose numbers are rounded.
 

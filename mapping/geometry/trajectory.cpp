@@ -124,8 +124,7 @@ Rigid3 MotionCorrection::displacement(double since_s) const {
   const auto before = static_cast<std::size_t>(at);
   const std::size_t after = std::min(before + 1, knots.size() - 1);
   const double along = at - static_cast<double>(before);
-  const Vector6d motion = (1 - along) * knots[before] + along * knots[after];
-  return {rotationBy(motion.tail<3>()), motion.head<3>()};
+  return rigidFromDifference((1 - along) * knots[before] + along * knots[after]);
 }
 
 CameraMotion::CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref_world,

@@ -14,8 +14,6 @@
 namespace efm {
 namespace {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-
 /// Length of a slice. A longer one would be blurred by its own motion.
 constexpr double kLengthS = 0.01;
 constexpr std::size_t kLevels = 3;
@@ -44,18 +42,6 @@ std::vector<Step> schedule() {
   for (int i = 1; i <= kReaching; ++i) steps.push_back({2, static_cast<double>(i) / kReaching});
   for (const std::size_t level : {1, 1, 0, 0, 0}) steps.push_back({level});
   return steps;
-}
-
-/// Returns the motion as numbers of `MotionCorrection`.
-Vector6d numbersOf(const Rigid3& motion) {
-  const Eigen::AngleAxisd turn(motion.rotation);  // 0 to pi, for either sign of the quaternion
-  Vector6d numbers;
-  numbers << motion.translation, turn.angle() * turn.axis();
-  return numbers;
-}
-
-Rigid3 motionOf(const Vector6d& numbers) {
-  return {rotationBy(numbers.tail<3>()), numbers.head<3>()};
 }
 
 cv::Mat1f halved(const cv::Mat1f& image) {
@@ -354,7 +340,7 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
 
   std::vector<Vector6d> knots = start.knots;
   const auto poseAt = [&](std::size_t slice) {
-    return T_ref_tracked_[slice] * motionOf(knots[slice]);
+    return T_ref_tracked_[slice] * rigidFromDifference(knots[slice]);
   };
   const std::size_t longer = std::max(none_.reference, count - 1 - none_.reference);
   for (const Step& step : schedule()) {
@@ -381,7 +367,7 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
   for (std::size_t slice = 0; slice < count; ++slice) {
     if (!has_pose_[slice] || slice == none_.reference) continue;
     found.correction.knots[slice] =
-        numbersOf(T_ref_tracked_[slice].inverse() * back * poseAt(slice));
+        differenceOf(T_ref_tracked_[slice].inverse() * back * poseAt(slice));
   }
   found.shift_px = shiftBetween(start, found.correction, points);
   return found;
@@ -396,7 +382,7 @@ double SliceAlignment::shiftBetween(const MotionCorrection& a, const MotionCorre
   for (std::size_t slice = 0; slice < a.knots.size(); ++slice) {
     if (!has_pose_[slice]) continue;
     const auto fromRef = [&](const MotionCorrection& by) {
-      return T_cam_rig * (T_ref_tracked_[slice] * motionOf(by.knots[slice])).inverse();
+      return T_cam_rig * (T_ref_tracked_[slice] * rigidFromDifference(by.knots[slice])).inverse();
     };
     const Rigid3 T_a_ref = fromRef(a);
     const Rigid3 T_b_ref = fromRef(b);

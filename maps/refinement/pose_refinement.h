@@ -42,13 +42,6 @@ EigenDecomposition eigenDecomposition(const Matrix6d& matrix);
 
 double maxEigenvalue(const Eigen::Matrix3d& matrix);
 
-/// Returns the motion T_a_b as six numbers: the translation in metres, then the rotation vector
-/// (axis times angle, at most pi) in radians. Covariances and informations have the same order.
-Vector6d differenceOf(const Rigid3& T_a_b);
-
-/// Inverts `differenceOf`.
-Rigid3 rigidFromDifference(const Vector6d& difference);
-
 // The refinement of poses, with Ceres. Poses change on the manifold of rotations and translations,
 // Jacobians are automatic, and one thread solves: results do not depend on the machine.
 

@@ -12,8 +12,6 @@
 
 namespace efm {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-
 /// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 if the
 /// tracker states nothing.
 struct NoiseScale {
