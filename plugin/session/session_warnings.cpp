@@ -268,10 +268,12 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
                                    const FusionMapperOptions& options) {
   const MotionCounts& motion = status.counts.motion;
   // Exact poses have up to 0.35 pixels on average, good hand-held trackers 0.55, typical ones 0.8
-  // or more. Several cameras: and the correction was worthwhile in most keyframes.
+  // or more. Several cameras: and the correction was worthwhile in most keyframes. One camera: two
+  // windows say so, because wrong depths, too, blur the events.
   constexpr double kWorthSayingPx = 0.6;
   if (motion.known == 0 || motion.meanBlurPx() < kWorthSayingPx) return std::nullopt;
   if (selectedCameras(status.rig, options.cameras).size() == 1) {
+    if (motion.known == 1) return std::nullopt;
     return Warning{
         "poses-blur",
         fmt::format("the poses blur the events by {:.1f} pixels within a window: with one camera "

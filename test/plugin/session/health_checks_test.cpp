@@ -614,6 +614,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        "7 keyframes was corrected ([refinement] correct_motion): they are 2.00 times as sharp; "
        "their own poses have such errors, too: --set refinement.enabled=true corrects them"},
       {blurred(1, 3, 0.5, 0), ""},
+      {blurred(1, 1, 1.2, 0), ""},
       {blurred(1, 3, 1.2, 0),
        "poses-blur: the poses blur the events by 1.2 pixels within a window: with one camera this "
        "cannot be corrected, because wrong depths explain a wrong motion"},
