@@ -15,6 +15,7 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/playback/output_checks.h"
 #include "plugin/playback/progress.h"
+#include "plugin/playback/recording_info.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"

@@ -7,7 +7,6 @@
 #include <exception>
 #include <fstream>
 #include <iterator>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,26 +19,14 @@
 #include "plugin/app/program.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/playback/progress.h"
+#include "plugin/playback/recording_info.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/first_look.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {
-
-/// Contents of a recording.
-struct Contents {
-  std::uint64_t observations = 0;
-  RecordingStatistics statistics;
-  std::map<std::string, std::uint64_t> others;  // number of other samples, by class
-
-  void add(const Sample& sample) {
-    ++observations;
-    if (!statistics.add(sample)) ++others[std::get<OtherSample>(sample).type];
-  }
-};
 
 std::string asText(const CameraModel& model) {
   const std::string size =
@@ -109,35 +96,22 @@ void printPoses(const RecordingStatistics& statistics) {
              statistics.eventsBeforePoses(), statistics.eventsAfterPoses());
 }
 
-void print(const Contents& contents, const RecordingCounts& counts) {
-  fmt::print("{} observations\n", contents.observations);
-  printCameras(contents.statistics);
-  printPoses(contents.statistics);
-  for (const auto& [name, count] : contents.others)
-    fmt::print("{}: {} observations\n", name, count);
-  if (counts.sorted_events > 0) {
-    fmt::print("{} events out of order by up to 10 ms\n", counts.sorted_events);
+void print(const RecordingInfo& info) {
+  fmt::print("{} observations\n", info.observations);
+  printCameras(info.statistics);
+  printPoses(info.statistics);
+  for (const auto& [name, count] : info.others) fmt::print("{}: {} observations\n", name, count);
+  if (info.counts.sorted_events > 0) {
+    fmt::print("{} events out of order by up to 10 ms\n", info.counts.sorted_events);
   }
-}
-
-/// Prints the values that `map` would choose, and uses the chosen depths for the checks.
-/// @return the warnings about the poses.
-std::vector<Warning> judge(FirstLook& look, bool quiet, Findings& findings) {
-  const RecordingSurvey survey = look.finish();
-  if (survey.samples.empty()) return {};
-  const EventFusionOptions defaults = defaultOptions();
-  FusionMapperOptions options = defaults.mapper;
-  const std::vector<ChosenOption> chosen =
-      chooseOptions(defaults.automatic, survey.rig, survey.samples, survey.duration_s, options)
-          .options;
-  if (!quiet) {
-    fmt::print("the options that are auto would be:\n");
-    for (const ChosenOption& option : chosen) {
-      fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
-    }
+  if (info.true_depth_maps > 0) {
+    fmt::print("truth: {} depth maps of camera 0\n", info.true_depth_maps);
   }
-  findings.use(options.keyframe.planes, chosen);
-  return survey.judgePoses(options).warnings;
+  if (info.chosen.empty()) return;
+  fmt::print("the options that are auto would be:\n");
+  for (const ChosenOption& option : info.chosen) {
+    fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
+  }
 }
 
 /// Returns the sizes of the data caches that the system reports.
@@ -172,36 +146,15 @@ int runInfo(const InfoArguments& arguments) {
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
   source.limits = RecordingTimes(source).resolve(arguments.times);
-  const std::unique_ptr<Recording> recording = openRecording(source);
-  Contents contents;
-  FirstLook look(defaultOptions());
-  bool takes = true;  // a recording may lack parts of a map
-  std::exception_ptr stopped;
+  RecordingInfo info;
   {
     Progress progress("reading", arguments.verbosity);
-    try {
-      while (const std::optional<Sample> sample = recording->next()) {
-        contents.add(*sample);
-        takes = look.take(*sample);
-        progress.show(recording->progress());
-      }
-    } catch (const std::exception&) {
-      stopped = std::current_exception();
-    }
+    info = readInfo(source, [&](double fraction) { progress.show(fraction); });
   }
-  const bool quiet = arguments.verbosity == Verbosity::kQuiet;
-  if (!quiet) print(contents, recording->counts());
-  if (const auto truth = openTruth(source); !truth.empty() && !quiet) {
-    fmt::print("truth: {} depth maps of camera 0\n", truth.size());
-  }
-  if (stopped) std::rethrow_exception(stopped);  // warnings of missing parts would be wrong then
-  if (!contents.statistics.eventSpan()) rejectLimitsWithoutEvents(source.limits, *recording);
-  Findings findings{contents.statistics, recording->counts()};
-  std::vector<Warning> warnings;
-  if (takes) warnings = judge(look, quiet, findings);
-  append(warnings, warningsOf(findings));
-  printWarnings(warnings);
-  return arguments.strict && failStrictly(warnings) ? kFailedStatus : 0;
+  if (arguments.verbosity != Verbosity::kQuiet) print(info);
+  if (info.error) std::rethrow_exception(info.error);
+  printWarnings(info.warnings);
+  return arguments.strict && failStrictly(info.warnings) ? kFailedStatus : 0;
 }
 
 std::string processorName() {

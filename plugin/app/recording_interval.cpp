@@ -71,11 +71,6 @@ std::optional<std::string> readAll(Recording& recording, const std::function<voi
   }
 }
 
-void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
-  if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
-  throw std::runtime_error(noEventText(limits, recording.counts()));
-}
-
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
               const std::filesystem::path& out) {
   return fail(fmt::format("{}; {} events and {} poses before it are written to {}", damage, events,

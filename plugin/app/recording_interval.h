@@ -56,10 +56,6 @@ class RecordingTimes {
 /// @return the error of the recording; std::nullopt if the recording was read to its end.
 std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take);
 
-/// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
-/// @param recording was read, and had no event.
-void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
-
 /// Reports the damage that ended a recording, after the data before it were written.
 /// @return the process's exit status.
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,

@@ -161,8 +161,9 @@ class MapSteps {
   EventFusionOptions& options;
   FirstPass first;
   std::unique_ptr<Recording> recording;
-  std::optional<MapOutput> output;
+  std::optional<MapOutput> output;  // none if no file is written
   MapReport report;
+  std::shared_ptr<const MapSnapshot> map;
 
   /// Returns whether the caller asks for the end.
   bool asksToStop() const { return job.stop && job.stop(); }
@@ -173,8 +174,11 @@ class MapSteps {
   void begin();
   /// Writes a file of the result. After an error, other files are written all the same.
   void write(const std::function<void()>& file);
-  /// Fills in the report, except its points. @return the map.
-  std::shared_ptr<const MapSnapshot> describe(MappingRun& run, bool stopped);
+  void tellProgress(const char* activity, double fraction) const {
+    if (job.on_progress) job.on_progress(activity, fraction);
+  }
+  /// Takes the map, and fills in the report, except its points.
+  void describe(MappingRun& run, bool stopped);
   /// Warns if the map has no points, few points, or points too far away for floats.
   void judgePoints(const MapCloud& points);
   /// Ends the measured time of the mapping and its files.
@@ -207,14 +211,17 @@ void MapSteps::warnOfNew() {
 void MapSteps::begin() {
   began_ = std::chrono::steady_clock::now();
   const RecordingSource all = job.sourceNow();
-  rejectOutputFolder(job, kind);
-  report.warnings = replacementWarnings(job.out, all);
-  warnOfNew();
+  if (!job.out.empty()) {
+    rejectOutputFolder(job, kind);
+    report.warnings = replacementWarnings(job.out, all);
+    warnOfNew();
+  }
   recording = firstLook();
   options.mapper.keyframe.sequence_maximum = sequenceMaximum();
   const bool changes = job.sourceNow().faults.perturbation.keyframe.any();  // by the chosen stride
   if (!recording || changes) recording = openRecording(job.sourceNow());
   requireNoStop();
+  if (job.out.empty()) return;
   output.emplace(job.out, kind, options.mapper.keyframe.planes,
                  job.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure, namesOf(all));
 }
@@ -244,6 +251,7 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
       first.statistics.addEvents(*packet);
     held->hold(std::move(*sample));
     progress.show(held->read().progress());
+    tellProgress("first look", held->read().progress());
   }
   if (takes) held->end(damage);
   const RecordingSurvey survey = look.finish();
@@ -289,7 +297,10 @@ std::optional<double> MapSteps::sequenceMaximum() {
         maximum.add(keyframe.max_confidence);
       },
       "first pass");
-  while (pass.mapNext()) requireNoStop();
+  while (pass.mapNext()) {
+    requireNoStop();
+    tellProgress("first pass", pass.fraction());
+  }
   pass.finish();  // the mapping reports its error
   return maximum.value();
 }
@@ -302,7 +313,7 @@ void MapSteps::write(const std::function<void()>& file) {
   }
 }
 
-std::shared_ptr<const MapSnapshot> MapSteps::describe(MappingRun& run, bool stopped) {
+void MapSteps::describe(MappingRun& run, bool stopped) {
   run.describe(report, stopped);
   report.recording = namesOf(job.source);
   report.faults = job.sourceNow().faults;
@@ -313,7 +324,6 @@ std::shared_ptr<const MapSnapshot> MapSteps::describe(MappingRun& run, bool stop
                                calibration + " replaced another calibration, the recording's own; "
                                              "--set rig.calibration= keeps that"});
   }
-  std::shared_ptr<const MapSnapshot> map;
   {
     const SecondsScope scope(report.times.real.map, report.times.cpu.output);
     map = run.mapper().snapshot();
@@ -322,7 +332,6 @@ std::shared_ptr<const MapSnapshot> MapSteps::describe(MappingRun& run, bool stop
   if (report.refinement && !map->trajectory.empty()) {
     report.pose_shift = shiftBetween(map->tracker_trajectory, map->trajectory);
   }
-  return map;
 }
 
 void MapSteps::judgePoints(const MapCloud& points) {
@@ -350,6 +359,10 @@ std::string MapSteps::stays() const {
 MapResult MapSteps::end(std::optional<UserError> error) {
   if (!error) error = write_error_;
   report.peak_memory_bytes = peakMemoryBytes();
+  if (!output) {
+    warnOfNew();
+    return {std::move(report), std::move(map), std::move(error)};
+  }
   // The result of an earlier run stays if this run has no keyframe or cannot write a file.
   const bool replaces = report.counts.keyframes > 0 && !(output->keepsEarlier() && write_error_);
   if (replaces || !std::filesystem::exists(output->folder() / "report.json")) {
@@ -358,7 +371,7 @@ MapResult MapSteps::end(std::optional<UserError> error) {
   }
   if (output->keepsEarlier() && error) error->add(stays());
   warnOfNew();
-  return {std::move(report), std::move(error), output->keepsEarlier()};
+  return {std::move(report), std::move(map), std::move(error), output->keepsEarlier()};
 }
 
 void MapSteps::rethrow(int written) const {
@@ -368,25 +381,47 @@ void MapSteps::rethrow(int written) const {
     throw;
   } catch (const std::runtime_error& error) {
     if (output && output->keepsEarlier()) throw std::runtime_error(userMessage(error) + stays());
-    if (written == 0) throw;
+    if (written == 0 || !output) throw;
     throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
                                          userMessage(error), written, output->folder().string()));
   }
 }
 
-/// Opens the file of the whole DSI; null if it is not asked for.
-std::unique_ptr<NpyDsiFile> dsiFile(const MapSteps& steps) {
-  const KeyframeMapperOptions& keyframe = steps.options.mapper.keyframe;
-  const auto reference = static_cast<std::size_t>(keyframe.reference_camera);
-  const std::vector<RigCamera>& cameras = steps.recording->rig().cameras;
-  if (!steps.job.save_dsi || reference >= cameras.size()) return nullptr;
-  return std::make_unique<NpyDsiFile>(steps.output->folder() / "dsi.npy",
-                                      keyframe.planes.num_planes,
-                                      makeReferenceView(cameras[reference].model, keyframe.view));
-}
+/// Gives the whole DSI to the job and to a file, if they ask for it.
+class DsiReceiver : public DsiSink {
+ public:
+  explicit DsiReceiver(const MapSteps& steps)
+      : on_plane_(steps.job.on_dsi_plane),
+        num_planes_(steps.options.mapper.keyframe.planes.num_planes) {
+    const KeyframeMapperOptions& keyframe = steps.options.mapper.keyframe;
+    const auto reference = static_cast<std::size_t>(keyframe.reference_camera);
+    const std::vector<RigCamera>& cameras = steps.recording->rig().cameras;
+    if (reference >= cameras.size()) return;  // the mapping rejects it
+    const ReferenceView view = makeReferenceView(cameras[reference].model, keyframe.view);
+    size_ = {view.width, view.height};
+    if (!steps.job.save_dsi || !steps.output) return;
+    file_ = std::make_unique<NpyDsiFile>(steps.output->folder() / "dsi.npy", num_planes_, view);
+  }
+
+  bool receives() const { return file_ || on_plane_; }
+  NpyDsiFile* file() const { return file_.get(); }
+  void addPlane(int plane, const float* values) override {
+    if (file_) file_->addPlane(plane, values);
+    if (on_plane_)
+      on_plane_(plane, num_planes_,
+                cv::Mat1f(size_.height, size_.width, const_cast<float*>(values)));
+  }
+
+ private:
+  std::function<void(int, int, const cv::Mat1f&)> on_plane_;
+  int num_planes_;
+  cv::Size size_;
+  std::unique_ptr<NpyDsiFile> file_;
+};
 
 /// Writes the files of a map, except its page and its report.
-void writeMap(MapSteps& steps, const MapSnapshot& map, const KeyframeSheet& sheet) {
+void writeMap(MapSteps& steps, const KeyframeSheet& sheet) {
+  const MapSnapshot& map = *steps.map;
   MapOutput& output = *steps.output;
   const EventFusionOptions& options = steps.options;
   StageTimes& times = steps.report.times;
@@ -408,7 +443,8 @@ void writeMap(MapSteps& steps, const MapSnapshot& map, const KeyframeSheet& shee
 }
 
 /// Writes map.html, which shows the report, and adds the time to the report.
-void writePage(MapSteps& steps, const MapSnapshot& map, const KeyframePictures& pictures) {
+void writePage(MapSteps& steps, const KeyframePictures& pictures) {
+  const MapSnapshot& map = *steps.map;
   MapReport& report = steps.report;
   double real_s = 0, cpu_s = 0;
   report.peak_memory_bytes = peakMemoryBytes();
@@ -435,7 +471,8 @@ void writePage(MapSteps& steps, const MapSnapshot& map, const KeyframePictures& 
 
 MapResult mapInto(MapJob job) {
   MapSteps steps(std::move(job), OutputKind::kMap);
-  steps.options.mapper.keyframe.view_events = true;  // the page shows them
+  const bool writes = !steps.job.out.empty();
+  steps.options.mapper.keyframe.view_events = writes;  // the page shows them
   std::atomic<int> written = 0;
   try {
     steps.begin();
@@ -449,23 +486,24 @@ MapResult mapInto(MapJob job) {
     });
     MappingRun run(*steps.recording, steps.options, std::move(steps.first), steps.job.verbosity,
                    [&](const KeyframeDepthMap& keyframe, const MappingRun& so_far) {
-                     writer.add(keyframe);
+                     if (writes) writer.add(keyframe);
                      if (steps.job.on_keyframe) steps.job.on_keyframe(keyframe, so_far);
                    });
     run.mapper().core().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
     bool stopped = false;
     while (!(stopped = steps.asksToStop()) && run.mapNext()) {
+      steps.tellProgress("mapping", run.fraction());
     }
     run.finish();
     if (steps.job.on_last_keyframe) steps.job.on_last_keyframe(run);
     writer.finish();
 
-    const auto map = steps.describe(run, stopped);
-    const bool has_keyframes = steps.report.counts.keyframes > 0;
-    if (has_keyframes) writeMap(steps, *map, sheet);
-    steps.judgePoints(*map->points);
+    steps.describe(run, stopped);
+    const bool has_files = writes && steps.report.counts.keyframes > 0;
+    if (has_files) writeMap(steps, sheet);
+    steps.judgePoints(*steps.map->points);
     steps.endTimes(writer);
-    if (has_keyframes) writePage(steps, *map, pictures);
+    if (has_files) writePage(steps, pictures);
     return steps.end(run.error());
   } catch (...) {
     steps.rethrow(written);
@@ -480,7 +518,7 @@ MapResult mapWindowInto(MapJob job) {
     steps.begin();
     MapCloud::ConstPtr points;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
-      steps.output->writeImages(keyframe);
+      if (steps.output) steps.output->writeImages(keyframe);
       const std::vector<CloudPoint> in_world =
           pointsInWorld(options.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe),
                         keyframe.T_world_ref);
@@ -488,28 +526,32 @@ MapResult mapWindowInto(MapJob job) {
           mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
       ++written;
     });
-    const std::unique_ptr<NpyDsiFile> dsi = dsiFile(steps);  // outlives the run
+    DsiReceiver dsi(steps);  // outlives the run
     bool made = false;
     MappingRun run(*steps.recording, options, std::move(steps.first), steps.job.verbosity,
-                   [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
+                   [&](const KeyframeDepthMap& keyframe, const MappingRun& so_far) {
                      made = true;
                      writer.add(keyframe);
+                     if (steps.job.on_keyframe) steps.job.on_keyframe(keyframe, so_far);
                    });
     run.mapper().core().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
-    run.mapper().core().setSink(dsi.get());
+    if (dsi.receives()) run.mapper().core().setSink(&dsi);
     while (run.mapNext()) {  // without its keyframe, a window has no result
       if (!made) steps.requireNoStop();
+      steps.tellProgress("mapping", run.fraction());
     }
     run.finish();
     writer.finish();
 
-    const auto map = steps.describe(run, false);
+    steps.describe(run, false);
     if (points) {
       describePoints(*points, steps.report);
-      steps.write([&] { steps.output->writeCloud("points.pcd", *points); });
-      if (dsi) steps.write([&] { steps.output->add(dsi->finish()); });
+      if (steps.output) {
+        steps.write([&] { steps.output->writeCloud("points.pcd", *points); });
+        if (dsi.file()) steps.write([&] { steps.output->add(dsi.file()->finish()); });
+      }
     }
-    steps.judgePoints(*map->points);
+    steps.judgePoints(*steps.map->points);
     steps.endTimes(writer);
     return steps.end(run.error());
   } catch (...) {

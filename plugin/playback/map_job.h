@@ -19,12 +19,12 @@
 
 namespace efm {
 
-/// A recording to map into a folder.
+/// A recording to map.
 struct MapJob {
   /// The recording. The options' calibration and hand-eye transform replace its own.
   RecordingSource source;
   EventFusionOptions options;   ///< See `prepare`.
-  std::filesystem::path out;    ///< The folder of the result.
+  std::filesystem::path out;    ///< The folder of the result. Empty: no file is written.
   bool force = false;           ///< Allow a folder that holds other files.
   bool plain_pictures = false;  ///< No enlargement or colour bar in depth.png and confidence.png.
   bool save_dsi = false;        ///< `mapWindowInto`: write the whole DSI.
@@ -38,6 +38,11 @@ struct MapJob {
   std::function<void(const std::string&)> note;
   std::function<void(const KeyframeDepthMap&, const MappingRun&)> on_keyframe;
   std::function<void(const MappingRun&)> on_last_keyframe;  ///< After the last keyframe.
+  /// Receives the fraction of an activity that is done, 0 to 1, after each sample.
+  std::function<void(const char* activity, double fraction)> on_progress;
+  /// `mapWindowInto`: receives the planes of the DSI, before the keyframe, in any order and from
+  /// several threads at once.
+  std::function<void(int plane, int num_planes, const cv::Mat1f& values)> on_dsi_plane;
 
   /// Returns the recording for the options so far: the stride may be chosen later. It is the length
   /// of tracker noise that is constant over a keyframe.
@@ -49,9 +54,10 @@ struct MapJob {
   void prepare();
 };
 
-/// The result of a job in its folder.
+/// The result of a job.
 struct MapResult {
   MapReport report;
+  std::shared_ptr<const MapSnapshot> map;  ///< Never null.
   /// Why the recording was not mapped to its end, or a file of the result could not be written.
   std::optional<UserError> error;
   bool kept_earlier = false;  ///< There is no new result: the folder's earlier result stays.

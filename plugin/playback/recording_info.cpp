@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/playback/recording_info.h"
+
+#include <nlohmann/json.hpp>
+
+#include <stdexcept>
+#include <utility>
+
+#include "plugin/session/first_look.h"
+#include "plugin/session/session_status.h"
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Takes the values that `map` would choose, and the warnings: the chosen depths serve the checks.
+void judge(FirstLook* look, RecordingInfo& info) {
+  Findings findings{info.statistics, info.counts};
+  if (look != nullptr) {
+    const RecordingSurvey survey = look->finish();
+    if (!survey.samples.empty()) {
+      const EventFusionOptions defaults = defaultOptions();
+      FusionMapperOptions options = defaults.mapper;
+      info.chosen =
+          chooseOptions(defaults.automatic, survey.rig, survey.samples, survey.duration_s, options)
+              .options;
+      findings.use(options.keyframe.planes, info.chosen);
+      info.warnings = survey.judgePoses(options).warnings;
+    }
+  }
+  append(info.warnings, warningsOf(findings));
+}
+
+/// Adds the number of samples of a stream, and their times.
+void add(Json& json, const char* what, const StreamStatistics& stream) {
+  json[what] = stream.count;
+  if (!stream.first_ns) return;
+  json["first_ns"] = *stream.first_ns;
+  json["last_ns"] = *stream.last_ns;
+  json["per_second"] = stream.rate();
+}
+
+Json asJson(const std::string& label, const CameraStatistics& statistics) {
+  const CameraModel& model = statistics.camera.model;
+  Json json = {{"name", label}, {"width", model.width}, {"height", model.height}};
+  json["calibrated"] = isCalibrated(model);
+  add(json, "events", statistics.events);
+  json["positive"] = statistics.positive;
+  return json;
+}
+
+Json asJson(const PoseSourceId& source, const PoseStatistics& statistics, bool used) {
+  const StreamStatistics& poses = statistics.poses;
+  Json json = {{"source", asText(source)}, {"used", used}};
+  add(json, "poses", poses);
+  if (poses.count < 2) return json;
+  json["max_gap_s"] = 1e-9 * static_cast<double>(poses.max_gap_ns);
+  json["path_m"] = statistics.path_m;
+  json["max_speed_m_s"] = statistics.max_speed;
+  json["max_rotation_rad_s"] = statistics.max_rotation_rate;
+  return json;
+}
+
+}  // namespace
+
+RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>& progress) {
+  source.faults.latency_ns = 0;  // latency changes no time stamp
+  source.complete = false;
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  RecordingInfo info;
+  FirstLook look(defaultOptions());
+  bool takes = true;  // a recording may lack parts of a map
+  try {
+    while (const std::optional<Sample> sample = recording->next()) {
+      ++info.observations;
+      if (!info.statistics.add(*sample)) ++info.others[std::get<OtherSample>(*sample).type];
+      takes = look.take(*sample);
+      if (progress) progress(recording->progress());
+    }
+    if (!info.statistics.eventSpan()) rejectLimitsWithoutEvents(source.limits, *recording);
+  } catch (const std::exception&) {
+    info.error = std::current_exception();
+  }
+  info.counts = recording->counts();
+  info.true_depth_maps = openTruth(source).size();
+  if (!info.error) judge(takes ? &look : nullptr, info);
+  return info;
+}
+
+std::string infoJson(const RecordingInfo& info) {
+  Json json = {{"observations", info.observations}};
+  json["cameras"] = Json::array();
+  for (const auto& [key, camera] : info.statistics.cameras()) {
+    json["cameras"].push_back(asJson(key.second, camera));
+  }
+  json["poses"] = Json::array();
+  for (const auto& [source, poses] : info.statistics.poseSources()) {
+    json["poses"].push_back(asJson(source, poses, &poses == info.statistics.usedPoses()));
+  }
+  json["events_before_poses"] = info.statistics.eventsBeforePoses();
+  json["events_after_poses"] = info.statistics.eventsAfterPoses();
+  json["others"] = info.others;
+  json["sorted_events"] = info.counts.sorted_events;
+  json["true_depth_maps"] = info.true_depth_maps;
+  json["chosen"] = Json::array();
+  for (const ChosenOption& option : info.chosen) {
+    json["chosen"].push_back(
+        {{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
+  }
+  json["warnings"] = Json::array();
+  for (const Warning& warning : info.warnings) {
+    json["warnings"].push_back({{"name", warning.name}, {"text", warning.text}});
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
+  if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
+  throw std::runtime_error(noEventText(limits, recording.counts()));
+}
+
+}  // namespace efm
