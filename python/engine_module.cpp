@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // event_fusion._engine: the engine of event_fusion/engine.h for Python. The package's Python files
 // turn arguments into the types that are taken here, and document the functions.
-#include <event_fusion/engine.h>
-#include <pybind11/functional.h>
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
-#include <pybind11/stl/filesystem.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -23,7 +14,8 @@
 #include <variant>
 #include <vector>
 
-namespace py = pybind11;
+#include "arrays.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 namespace {
@@ -34,105 +26,6 @@ struct EventRecord {
   std::int16_t p;
   std::int64_t t;
 };
-
-using Paths = std::vector<std::filesystem::path>;
-using Matrix4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-template <typename Matrix>
-Array arrayOf(const Matrix& matrix) {
-  Array array({matrix.rows(), matrix.cols()});
-  Eigen::Map<Matrix>(array.mutable_data()) = matrix;
-  return array;
-}
-
-template <typename Matrix>
-Matrix matrixOf(const Array& array, const char* name) {
-  const auto rows = Matrix::RowsAtCompileTime;
-  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != rows) {
-    throw std::invalid_argument(std::string(name) + ": expected a matrix of " +
-                                std::to_string(rows) + " x " + std::to_string(rows) + " numbers");
-  }
-  return Eigen::Map<const Matrix>(array.data());
-}
-
-Matrix4 matrixOf(const Rigid3& T_a_b) {
-  Matrix4 matrix = Matrix4::Identity();
-  matrix.topLeftCorner<3, 3>() = T_a_b.rotation.toRotationMatrix();
-  matrix.topRightCorner<3, 1>() = T_a_b.translation;
-  return matrix;
-}
-
-/// Returns the pose of a matrix, or of tx ty tz qx qy qz qw.
-/// @param name of the argument, for errors.
-Rigid3 rigidOf(const Array& array, const char* name) {
-  if (array.ndim() == 1 && array.size() == 7) {
-    const double* v = array.data();
-    const auto rotation =
-        rotationNear(Eigen::Quaterniond(v[6], v[3], v[4], v[5]));  // as of a TUM file
-    if (!rotation) {
-      throw std::invalid_argument(std::string(name) +
-                                  ": expected tx ty tz qx qy qz qw, with a quaternion of length 1");
-    }
-    return {*rotation, {v[0], v[1], v[2]}};
-  }
-  const auto T_a_b = transformNear(matrixOf<Matrix4>(array, name));
-  if (!T_a_b) {
-    throw std::invalid_argument(std::string(name) +
-                                ": expected [R t; 0 0 0 1] with a rotation matrix R");
-  }
-  return *T_a_b;
-}
-
-/// Returns a camera matrix.
-Array kOf(double fx, double fy, double cx, double cy) {
-  Matrix3 K;
-  K << fx, 0, cx, 0, fy, cy, 0, 0, 1;
-  return arrayOf(K);
-}
-
-/// Returns an array that shares the memory of `owner`, read-only.
-template <typename T, typename Owner>
-py::array sharedArray(const py::dtype& type, std::vector<py::ssize_t> shape,
-                      std::vector<py::ssize_t> strides, const T* data, Owner owner) {
-  const py::capsule base(new Owner(std::move(owner)),
-                         [](void* kept) { delete static_cast<Owner*>(kept); });
-  py::array array(type, std::move(shape), std::move(strides), data, base);
-  array.attr("flags").attr("writeable") = false;
-  return array;
-}
-
-py::array imageOf(const cv::Mat1f& image) {
-  return sharedArray(py::dtype::of<float>(), {image.rows, image.cols},
-                     {static_cast<py::ssize_t>(image.step[0]), sizeof(float)}, image.ptr<float>(),
-                     image);
-}
-
-py::array pointsOf(const MapCloud::ConstPtr& cloud) {
-  const py::dtype type(
-      py::cast(std::vector<std::string>{"x", "y", "z", "intensity", "support", "sigma"}),
-      py::cast(std::vector<std::string>{"f4", "f4", "f4", "f4", "u4", "f4"}),
-      py::cast(std::vector<std::size_t>{offsetof(MapPoint, x), offsetof(MapPoint, y),
-                                        offsetof(MapPoint, z), offsetof(MapPoint, intensity),
-                                        offsetof(MapPoint, support), offsetof(MapPoint, sigma)}),
-      sizeof(MapPoint));
-  return sharedArray(type, {static_cast<py::ssize_t>(cloud->size())}, {sizeof(MapPoint)},
-                     cloud->points.data(), cloud);
-}
-
-/// Poses as times (n,) in nanoseconds and matrices (n, 4, 4).
-py::tuple posesOf(const std::vector<StampedPose>& poses) {
-  const auto count = static_cast<py::ssize_t>(poses.size());
-  py::array_t<std::int64_t> times(count);
-  py::array_t<double> matrices({count, py::ssize_t{4}, py::ssize_t{4}});
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const StampedPose& pose = poses[static_cast<std::size_t>(i)];
-    times.mutable_at(i) = pose.t_ns;
-    Eigen::Map<Matrix4>(matrices.mutable_data(i)) = matrixOf(pose.T_world_rig);
-  }
-  return py::make_tuple(times, matrices);
-}
 
 using EventArray = py::array_t<EventRecord, py::array::c_style>;
 
@@ -156,17 +49,16 @@ EventArray recordsOf(const std::vector<Event>& events) {
   return records;
 }
 
-/// Lets Ctrl-C end a long call.
-void checkSignals() {
-  const py::gil_scoped_acquire held;
-  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+/// Opens a recording to read it: poses and calibration may be missing.
+std::unique_ptr<Recording> openToRead(RecordingSource source) {
+  source.complete = false;
+  return openRecording(source);
 }
 
 /// The events of a recording's camera. At damage, the events before it come first.
 class EventReader {
  public:
-  EventReader(const Paths& files, const Overrides& overrides)
-      : recording_(openRecording(files, overrides)) {}
+  explicit EventReader(const RecordingSource& source) : recording_(openToRead(source)) {}
 
   /// Returns at most `count` events of the camera; none at the end.
   EventArray next(int camera, std::size_t count) {
@@ -204,8 +96,18 @@ class EventReader {
   std::exception_ptr damage_;
 };
 
-std::vector<StampedPose> readPoses(const Paths& files, const Overrides& overrides) {
-  const auto recording = openRecording(files, overrides);
+/// Returns the time of a recording's first event, of any camera.
+std::optional<std::int64_t> firstEvent(const RecordingSource& source) {
+  const auto recording = openToRead(source);
+  while (const auto sample = recording->next()) {
+    const auto* packet = std::get_if<EventPacket>(&*sample);
+    if (packet != nullptr && !packet->events.empty()) return packet->events.front().t_ns;
+  }
+  return std::nullopt;
+}
+
+std::vector<StampedPose> readPoses(const RecordingSource& source) {
+  const auto recording = openToRead(source);
   std::vector<StampedPose> poses;
   while (const auto sample = recording->next()) {
     if (const auto* pose = std::get_if<PoseSample>(&*sample)) {
@@ -214,8 +116,6 @@ std::vector<StampedPose> readPoses(const Paths& files, const Overrides& override
   }
   return poses;
 }
-
-using OnKeyframe = std::function<void(const std::shared_ptr<const Keyframe>&)>;
 
 /// A mapper's own thread may wait for the interpreter's lock, so its end must not hold it.
 struct DeleteReleased {
@@ -226,20 +126,20 @@ struct DeleteReleased {
 };
 using MapperPointer = std::unique_ptr<Mapper, DeleteReleased>;
 
-/// A mapper whose callback gets a shared keyframe: a copy shares the images.
-MapperPointer makeMapper(const Options& options, const OnKeyframe& on_keyframe) {
+MapperPointer makeMapper(const Options& options, const OnKeyframe& on_keyframe,
+                         const std::function<void(const std::string&)>& on_warning) {
   Mapper::Callbacks callbacks;
   if (on_keyframe) {
     callbacks.on_keyframe = [on_keyframe](const Keyframe& keyframe) {
-      const py::gil_scoped_acquire held;
-      on_keyframe(std::make_shared<const Keyframe>(keyframe));
+      give(keyframe, on_keyframe);
     };
   }
+  callbacks.warn = on_warning;
   return MapperPointer(new Mapper(options, std::move(callbacks)));
 }
 
-void addRecording(Mapper& mapper, const Paths& files, const Overrides& overrides) {
-  const auto recording = openRecording(files, overrides);
+void addRecording(Mapper& mapper, const RecordingSource& source) {
+  const auto recording = openRecording(source);
   while (auto sample = recording->next()) {
     mapper.add(std::move(*sample));
     checkSignals();
@@ -261,7 +161,29 @@ void translateErrors() {
 }
 
 void defineCameras(py::module_& module) {
-  py::class_<RigCamera>(module, "Camera")
+  py::class_<RigCamera>(module, "Camera", R"(A calibrated camera of a rig.
+
+Parameters
+----------
+width, height : int
+    Pixels of the sensor.
+K : array_like, shape (3, 3)
+    Camera matrix, pixels. Skew is ignored.
+distortion : str
+    The lens, as Kalibr calls it: 'none', 'radtan' or 'equidistant'.
+coefficients : sequence of float
+    k1 k2 p1 p2, or k1 k2 p1 p2 k3, of radtan; k1 k2 k3 k4 of equidistant.
+T_rig_cam : array_like, shape (4, 4) or (7,)
+    Maps coordinates of the camera (x right, y down, z forward) to the rig's, metres; a matrix, or tx ty tz qx qy qz qw.
+    By default the camera's frame is the rig's.
+time_offset_ns : int
+    Added to the camera's times to get the clock of the poses.
+
+Raises
+------
+ValueError
+    If a value is not that of a camera.
+)")
       .def(py::init([](int width, int height, const Array& K_array, const std::string& distortion,
                        std::vector<double> coefficients, const std::optional<Array>& T_rig_cam,
                        std::int64_t time_offset_ns) {
@@ -290,26 +212,66 @@ void defineCameras(py::module_& module) {
       .def_readonly("time_offset_ns", &RigCamera::time_offset_ns);
 }
 
+/// Returns the standard deviation of each depth, in metres; 0 where there is no depth.
+cv::Mat1f sigmaOf(const DepthMap& map) {
+  cv::Mat1f sigma = cv::Mat1f::zeros(map.depth.size());
+  for (int y = 0; y < sigma.rows; ++y) {
+    for (int x = 0; x < sigma.cols; ++x) {
+      const float z = map.depth(y, x);
+      if (z > 0) sigma(y, x) = z * z * std::sqrt(map.variance(y, x));
+    }
+  }
+  return sigma;
+}
+
+/// Returns the points (n, 3) of a keyframe's pixels with depth, in the world, row by row.
+py::array_t<double> worldPoints(const Keyframe& keyframe) {
+  const cv::Mat1f& depth = keyframe.map.depth;
+  const ReferenceView& view = keyframe.view;
+  py::array_t<double> points({py::ssize_t{cv::countNonZero(depth)}, py::ssize_t{3}});
+  double* next = points.mutable_data();
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      const double z = depth(y, x);
+      if (!(z > 0)) continue;
+      const Eigen::Vector3d p_ref((x - view.cx) / view.fx * z, (y - view.cy) / view.fy * z, z);
+      Eigen::Map<Eigen::Vector3d>{next} = keyframe.T_world_ref * p_ref;
+      next += 3;
+    }
+  }
+  return points;
+}
+
 void defineKeyframes(py::module_& module) {
-  py::class_<Keyframe, std::shared_ptr<Keyframe>>(module, "Keyframe")
+  py::class_<Keyframe, std::shared_ptr<Keyframe>>(module, "Keyframe",
+                                                  R"(The depth map of a window of events.
+
+Attributes
+----------
+t : int
+    Time of the view, nanoseconds.
+window : (int, int)
+    Begin and end of the events, nanoseconds.
+depth : numpy.ndarray, float32, shape (rows, columns)
+    Metres along z of the view; 0: no depth. Read-only, as the others.
+confidence : numpy.ndarray, float32, shape (rows, columns)
+    Fused ray density at the depth, or the largest of the pixel.
+sigma : numpy.ndarray, float32, shape (rows, columns)
+    Standard deviation of the depth, metres; 0: no depth.
+pose : numpy.ndarray, float64, shape (4, 4)
+    T_world_ref: maps coordinates of the view (x right, y down, z forward) to the world.
+K : numpy.ndarray, float64, shape (3, 3)
+    Camera matrix of the view, which has no distortion.
+)")
       .def_property_readonly("t", [](const Keyframe& k) { return k.window.t_ref_ns; })
       .def_property_readonly(
           "window", [](const Keyframe& k) { return std::pair(k.window.t0_ns, k.window.t1_ns); })
       .def_property_readonly("depth", [](const Keyframe& k) { return imageOf(k.map.depth); })
       .def_property_readonly("confidence",
                              [](const Keyframe& k) { return imageOf(k.map.confidence); })
-      .def_property_readonly("sigma",
-                             [](const Keyframe& k) {
-                               cv::Mat1f sigma = cv::Mat1f::zeros(k.map.depth.size());
-                               for (int y = 0; y < sigma.rows; ++y) {
-                                 for (int x = 0; x < sigma.cols; ++x) {
-                                   const float z = k.map.depth(y, x);
-                                   sigma(y, x) =
-                                       z > 0 ? z * z * std::sqrt(k.map.variance(y, x)) : 0;
-                                 }
-                               }
-                               return imageOf(sigma);
-                             })
+      .def_property_readonly("sigma", [](const Keyframe& k) { return imageOf(sigmaOf(k.map)); })
+      .def("points", &worldPoints,
+           "The points (n, 3) of the depths in the world, metres, row by row.")
       .def_property_readonly("pose",
                              [](const Keyframe& k) { return arrayOf(matrixOf(k.T_world_ref)); })
       .def_property_readonly(
@@ -317,42 +279,63 @@ void defineKeyframes(py::module_& module) {
 }
 
 void defineRecordings(py::module_& module) {
-  py::class_<Overrides>(module, "Overrides")
-      .def(py::init([](std::filesystem::path poses, std::filesystem::path calibration,
-                       std::filesystem::path hand_eye, std::optional<std::int64_t> t0_ns,
-                       std::optional<std::int64_t> t1_ns) {
-        return Overrides{
-            std::move(poses), std::move(calibration), std::move(hand_eye), {t0_ns, t1_ns}};
-      }));
+  py::class_<RecordingSource>(module, "Source")
+      .def(py::init(
+          [](const Paths& files, std::filesystem::path poses, std::filesystem::path calibration,
+             std::filesystem::path hand_eye, std::string format, std::vector<std::string> topics,
+             std::string event_columns, std::string time_unit,
+             std::optional<std::pair<int, int>> sensor_size, std::uint64_t skip_bad_events) {
+            RecordingSource source = sourceOf(
+                files, {std::move(poses), std::move(calibration), std::move(hand_eye), {}});
+            source.format = std::move(format);
+            source.reader.topics = std::move(topics);
+            source.reader.columns = std::move(event_columns);
+            source.reader.time_unit = std::move(time_unit);
+            if (sensor_size) source.reader.sensor_size = {sensor_size->first, sensor_size->second};
+            source.skip_bad_events = skip_bad_events;
+            return source;
+          }))
+      .def("set_limits", [](RecordingSource& source, std::optional<std::int64_t> t0_ns,
+                            std::optional<std::int64_t> t1_ns) {
+        source.limits = {t0_ns, t1_ns};
+        source.limits.validate();
+      });
   py::class_<EventReader>(module, "EventReader")
-      .def(py::init<const Paths&, const Overrides&>(), py::call_guard<py::gil_scoped_release>())
+      .def(py::init<const RecordingSource&>(), py::call_guard<py::gil_scoped_release>())
       .def("next", &EventReader::next);
-  module.def("read_rig", [](const Paths& files, const Overrides& overrides) {
+  module.def("read_rig", [](const RecordingSource& source) {
     const py::gil_scoped_release released;
-    return openRecording(files, overrides)->rig().cameras;
+    return openToRead(source)->rig().cameras;
   });
-  module.def("read_poses", [](const Paths& files, const Overrides& overrides) {
+  module.def("first_event", &firstEvent, py::call_guard<py::gil_scoped_release>());
+  module.def("read_poses", [](const RecordingSource& source) {
     std::vector<StampedPose> poses;
     {
       const py::gil_scoped_release released;
-      poses = readPoses(files, overrides);
+      poses = readPoses(source);
     }
     return posesOf(poses);
   });
 }
 
 void defineMapper(py::module_& module) {
-  py::class_<Options>(module, "Options").def(py::init<>()).def("set", &Options::set);
+  py::class_<Options>(module, "Options")
+      .def(py::init<>())
+      .def("set", &Options::set)
+      .def("read", &Options::read)
+      .def("validate", [](const Options& options) { options.values(); });
   const py::call_guard<py::gil_scoped_release> releases;
   py::class_<Mapper, MapperPointer>(module, "Mapper")
-      .def(py::init(&makeMapper), py::arg("options"), py::arg("on_keyframe"))
+      .def(py::init(&makeMapper), py::arg("options"), py::arg("on_keyframe"), py::arg("on_warning"))
       .def("add_camera", &Mapper::addCamera, releases)
-      .def("add_events",
-           [](Mapper& mapper, int camera, const EventArray& records) {
-             std::vector<Event> events = eventsOf(records);
-             const py::gil_scoped_release released;
-             mapper.addEvents(camera, std::move(events));
-           })
+      .def(
+          "add_events",
+          [](Mapper& mapper, int camera, const EventArray& records) {
+            std::vector<Event> events = eventsOf(records);
+            const py::gil_scoped_release released;
+            mapper.addEvents(camera, std::move(events));
+          },
+          py::arg("camera"), py::arg("records").noconvert())  // it would convert by position
       .def("add_pose",
            [](Mapper& mapper, std::int64_t t_ns, const Array& T_world_rig) {
              const StampedPose pose{t_ns, rigidOf(T_world_rig, "T_world_rig")};
@@ -361,6 +344,18 @@ void defineMapper(py::module_& module) {
            })
       .def("add_recording", &addRecording, releases)
       .def("finish", &Mapper::finish, releases)
+      .def("stop", &Mapper::stop, releases)
+      .def(
+          "save",
+          [](const Mapper& mapper, const std::filesystem::path& file) {
+            savePoints(*mapper.points(), file);
+          },
+          releases)
+      .def("status",
+           [](const Mapper& mapper) {
+             const SessionStatus status = mapper.status();
+             return std::pair(status.counts.keyframes, status.live ? status.live->dropRatio() : 0);
+           })
       .def("points", [](const Mapper& mapper) { return pointsOf(mapper.points()); })
       .def("trajectory", [](const Mapper& mapper) { return posesOf(mapper.trajectory()); })
       .def("warnings", [](const Mapper& mapper) {
@@ -382,6 +377,7 @@ PYBIND11_MODULE(_engine, module) {
   defineKeyframes(module);
   defineRecordings(module);
   defineMapper(module);
+  defineJobs(module);
 }
 
 }  // namespace efm

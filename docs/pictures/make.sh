@@ -96,3 +96,30 @@ fault inverted poses-inverted
 
 change scale '{ $2 *= 2; $3 *= 2; $4 *= 2; print }'
 fault scale scale
+
+# The figures of docs/python.md.
+PYTHONPATH=$(realpath "$(dirname "$tool")/../python") MPLBACKEND=agg /usr/bin/python3 - "$here/python.png" <<'END'
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+from PIL import Image
+
+import event_fusion as ef
+from event_fusion import plot
+
+desk = ef.open("desk")
+made = ef.map(desk)
+keyframe = made.keyframes[len(made) // 2]
+figure, axes = plt.subplots(2, 3, figsize=(13, 6.5), layout="constrained")
+plot.depth(keyframe, axes[0, 0])
+plot.confidence(keyframe, axes[0, 1])
+plot.error(keyframe, desk, axes[0, 2], tolerance_px=1)
+plot.precision_recall(ef.evaluate.depth(made, desk, tolerance_px=1), axes[1, 0])
+plot.map(made, axes[1, 1])
+plot.trajectory(desk, made, labels=["tracker", "keyframes"], ax=axes[1, 2])
+figure.dpi = 100
+figure.canvas.draw()
+Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3]).save(sys.argv[1])
+END
+"$here/shrink_png.py" "$here/python.png"

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs a build, builds the examples against what was installed, in another folder, and runs them: the maps are
-# the same, bit for bit, by the program, by the engine and by MRPT's builder.
+# the same, bit for bit, by the program, by the engine, by MRPT's builder and in Python.
 #   install_test.sh BUILD RECORDING WORK     BUILD has the project, RECORDING a folder that `map` reads
 set -euo pipefail
 build=$(realpath "$1") recording=$(realpath "$2")
+source=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
 rm -rf "$3"
 mkdir -p "$3"
 cd "$3"
@@ -62,7 +63,26 @@ grep -q "libevent-fusion.so.* => $libraries" ldd.txt || fail "pkg-config gives a
 ldd "$libraries/libevent-fusion.so" >ldd.txt
 ! grep mrpt ldd.txt || fail "the engine needs MRPT"
 
+# Python's package: installed below the prefix, and by pip as a wheel, which needs no network.
+python=$(sed -n 's/^EFM_PYTHON_DIR:STRING=//p' "$build/CMakeCache.txt")
+if [ -n "$python" ]; then
+  cat >map.py <<'END'
+import sys
+import event_fusion as ef
+ef.map(ef.open(sys.argv[1])).save(sys.argv[2])
+ef.Mapper("only_here" if len(sys.argv) > 3 else "simulated_stereo")  # the option files are found by their names
+END
+  PYTHONPATH=prefix/$python /usr/bin/python3 map.py "$recording" python.pcd only_here || fail "the installed package does not map"
+  /usr/bin/python3 -m venv --system-site-packages env
+  EFM_BUILD=$build env/bin/pip install --no-index --quiet "$source" || fail "pip does not install the package"
+  mv prefix away  # the wheel has the engine
+  env/bin/python map.py "$recording" wheel.pcd || fail "the wheel does not map"
+  mv away prefix
+  for map in python.pcd wheel.pcd; do
+    cmp out/map.pcd $map || fail "$map is not the program's map"
+  done
+fi
+
 # What was installed needs neither the source tree nor the build tree.
-source=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
 ! grep -rl -e "$build" -e "$source" --include='*.cmake' --include='*.pc' --include='*.h' prefix || fail "the package has paths of the build"
 echo passed

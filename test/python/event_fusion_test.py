@@ -1,17 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The package event_fusion: the arrays of recordings, and maps that are those of the program."""
 
+import glob
+import json
 import os
+import shutil
+import signal
 import subprocess
+import sys
 import threading
+import time
 from decimal import Decimal
 
+import matplotlib
 import numpy as np
 import pytest
 
 import event_fusion as ef
+from event_fusion._events import event_records
+
+matplotlib.use("agg")
+from event_fusion import plot  # noqa: E402
 
 DESK = os.path.join(os.environ["EFM_RECORDINGS"], "desk_stereo")
+SOURCE = os.environ["EFM_SOURCE"]
 OPTIONS = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "keyframes.stride_s": 0.5}
 
 
@@ -20,14 +32,30 @@ def desk():
     return ef.open(DESK)
 
 
+def program(*arguments):
+    """Run the program and return what it prints."""
+    words = [os.environ["EFM_EVENT_FUSION"], *map(str, arguments)]
+    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+
+
 @pytest.fixture(scope="module")
-def by_program(tmp_path_factory):
-    """Map the desk by the program: the points of map.pcd, and keyframe depths."""
+def folder(tmp_path_factory):
+    """Map the desk by the program."""
     out = tmp_path_factory.mktemp("map") / "out"
-    settings = [word for key, value in OPTIONS.items() for word in ("--set", f"{key}={value}")]
-    program = [os.environ["EFM_EVENT_FUSION"], "map", DESK, "-q", "--out", str(out)]
-    subprocess.run(program + settings, check=True)
-    return points_of(out / "map.pcd")
+    program("map", DESK, "-q", "--out", out, *(f"--set={key}={value}" for key, value in OPTIONS.items()))
+    return out
+
+
+@pytest.fixture(scope="module")
+def by_program(folder):
+    """Return the points of the program's map."""
+    return points_of(folder / "map.pcd")
+
+
+@pytest.fixture(scope="module")
+def made(desk):
+    """Map the desk in memory."""
+    return ef.map(desk, OPTIONS)
 
 
 def points_of(pcd):
@@ -40,8 +68,10 @@ def points_of(pcd):
     return np.frombuffer(content[end:], dtype, int(header["POINTS"]))
 
 
-def test_all_ways_give_the_map_of_the_program(desk, by_program):
-    from_file = ef.map(desk, OPTIONS)
+def test_all_ways_give_the_map_of_the_program(desk, by_program, made):
+    from_file = ef.Mapper(OPTIONS)
+    from_file.add_recording(desk)
+    from_file.finish()
     keyframes = []
     mapper = ef.Mapper(OPTIONS, keyframes.append)
     for camera in desk.rig:
@@ -55,15 +85,14 @@ def test_all_ways_give_the_map_of_the_program(desk, by_program):
             mapper.add_events(camera, part)
     mapper.finish()
     assert len(by_program) > 1000
-    for points in (from_file.points, mapper.points):
+    for points in (from_file.points, mapper.points, made.points):
         for name in ("x", "y", "z", "intensity", "support", "sigma"):
             np.testing.assert_array_equal(points[name], by_program[name], name)
-    assert [k.t for k in keyframes] == [k.t for k in from_file] == list(from_file.trajectory[0])
-    np.testing.assert_array_equal(keyframes[0].depth, from_file.keyframes[0].depth)
+    assert [k.t for k in keyframes] == [k.t for k in made] == list(from_file.trajectory[0])
+    np.testing.assert_array_equal(keyframes[0].depth, made.keyframes[0].depth)
 
 
-def test_a_keyframe_lies_on_the_points_of_the_map(desk):
-    made = ef.map(desk, OPTIONS)
+def test_a_keyframe_lies_on_the_points_of_the_map(made):
     keyframe = made.keyframes[0]
     rows, columns = np.nonzero(keyframe.depth)
     assert keyframe.depth.dtype == keyframe.confidence.dtype == keyframe.sigma.dtype == np.float32
@@ -72,6 +101,7 @@ def test_a_keyframe_lies_on_the_points_of_the_map(desk):
     z = keyframe.depth[rows, columns]
     p_ref = np.linalg.inv(keyframe.K) @ np.stack([columns * z, rows * z, z])
     p_world = (keyframe.pose @ np.vstack([p_ref, np.ones_like(z)]))[:3].T
+    np.testing.assert_allclose(keyframe.points(), p_world, rtol=0, atol=1e-6)  # the depths are floats
     points = np.stack([made.points[axis] for axis in "xyz"], axis=1)
     # The map averages the points of a voxel of 2 cm.
     for p in p_world[:: len(p_world) // 50]:
@@ -119,7 +149,7 @@ def test_arrays_of_other_programs_are_read_by_their_fields(desk, dtype, unit, pe
     other["x"], other["y"] = whole["x"], whole["y"]
     other["p" if "p" in names else "polarity"] = whole["p"]
     other[next(name for name in names if name.startswith("t"))] = whole["t"] / per if unit == "s" else whole["t"] // per
-    made = ef._event_records(other, unit)
+    made = event_records(other, unit)
     for name in "xyp":
         np.testing.assert_array_equal(made[name], whole[name])
     assert np.max(np.abs(made["t"] - whole["t"]), initial=0) <= (1 if unit == "s" else 0)
@@ -147,6 +177,14 @@ ERRORS = {
     ),
     "no rotation": (lambda: stereo_mapper().add_pose(0, np.ones((4, 4))), ValueError, "rotation matrix"),
     "no quaternion": (lambda: stereo_mapper().add_pose(0, np.ones(7)), ValueError, "length 1"),
+    "no time": (lambda: ef.open(DESK, t0="soon"), ValueError, "t0 = 'soon'"),
+    "an interval backwards": (lambda: ef.open(DESK, t0=5, t1=4), ValueError, "t1"),
+    "an unknown preset": (lambda: ef.simulate("desk"), ValueError, "desk_stereo"),
+    "a wrong option of a map": (lambda: ef.map(ef.open(DESK), {"dsi.num_planes": -3}), ValueError, "num_planes"),
+    "no truth": (lambda: ef.evaluate.true_depth(DESK, 7), OSError, "7 ns"),
+    "no cloud": (lambda: ef.evaluate.map(np.zeros(3), DESK), ValueError, r"\(3,\)"),
+    "two sizes": (lambda: ef.evaluate.depth(np.ones((3, 4)), np.ones((4, 4))), (OSError, ValueError), "4"),
+    "an unknown alignment": (lambda: ef.evaluate.trajectory(DESK, DESK, alignment="sim3"), ValueError, "se3"),
     "no pose": (lambda: stereo_mapper().add_pose(0, np.ones((3, 4))), ValueError, "4 x 4"),
 }
 
@@ -181,3 +219,246 @@ def test_two_mappers_run_in_two_threads(desk, by_program):
     for result in made:
         np.testing.assert_array_equal(result.points["z"], by_program["z"])
     assert len(made) == 2
+
+
+def test_the_map_is_that_of_the_program_with_options_from_the_data_and_its_folder_too(desk, tmp_path):
+    program("map", DESK, "-q", "--out", tmp_path / "program")
+    made = ef.map(desk, out=tmp_path / "python")
+    points = points_of(tmp_path / "program" / "map.pcd")
+    for name in points.dtype.names:
+        np.testing.assert_array_equal(made.points[name], points[name], name)
+    assert (tmp_path / "python" / "map.pcd").read_bytes() == (tmp_path / "program" / "map.pcd").read_bytes()
+    files = [sorted(os.listdir(tmp_path / way)) for way in ("program", "python")]
+    assert files[0] == files[1]
+    report = json.loads((tmp_path / "program" / "report.json").read_text())
+    assert made.report["chosen"] == report["chosen"] != []
+    assert made.report["keyframes"] == report["keyframes"] and made.report["votes"] == report["votes"]
+    assert [name for name, _ in made.warnings] == [warning["name"] for warning in report["warnings"]]
+    assert len(made) == len(made.keyframes) == report["keyframes"]
+
+
+def test_keyframes_come_while_the_recording_is_mapped_and_need_not_be_kept(desk, made):
+    fractions = []
+    streamed = ef.map(desk, OPTIONS, keep=False, progress=lambda activity, done: fractions.append((activity, done)))
+    times = []
+    for keyframe in streamed:
+        times.append(keyframe.t)
+        assert streamed._result is None  # it is still being made
+    assert times == [keyframe.t for keyframe in made]
+    np.testing.assert_array_equal(streamed.points["x"], made.points["x"])
+    assert {activity for activity, _ in fractions} == {"first look", "mapping"}
+    assert all(0 <= done <= 1 for _, done in fractions)
+    with pytest.raises(RuntimeError, match="keep=False"):
+        streamed.keyframes
+
+
+def test_a_map_that_nobody_waits_for_ends(desk):
+    before = threading.active_count()
+    abandoned = ef.map(desk, OPTIONS, keep=False)
+    next(iter(abandoned))
+    del abandoned
+    closed = ef.map(desk, OPTIONS)
+    closed.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        closed.points
+    deadline = time.monotonic() + 30
+    while threading.active_count() > before and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert threading.active_count() == before
+
+
+def test_ctrl_c_ends_a_map(tmp_path):
+    script = tmp_path / "wait.py"
+    script.write_text(
+        "import sys, event_fusion as ef\n"
+        "made = ef.map(ef.open(sys.argv[1]), {'keyframes.stride_s': 0.001}, keep=False)\n"
+        "for keyframe in made: print(keyframe.t, flush=True)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, script, DESK], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
+        running.stdout.readline()
+        running.send_signal(signal.SIGINT)
+        errors = running.communicate(timeout=60)[1]
+    assert errors.strip().endswith("KeyboardInterrupt")
+    assert running.returncode != 0
+
+
+def damaged_desk(folder):
+    """Copy the desk with a line of damage at 60 % of camera 1's events."""
+    for name in ("camchain.yaml", "poses.txt"):
+        shutil.copy(os.path.join(DESK, name), folder)
+    for camera in ("cam0", "cam1"):
+        (folder / camera).mkdir()
+        text = open(os.path.join(DESK, camera, "events.txt")).read()
+        cut = text.index("\n", int(0.6 * len(text))) + 1
+        (folder / camera / "events.txt").write_text(text if camera == "cam0" else text[:cut] + "damage\n" + text[cut:])
+    return folder
+
+
+def test_damage_is_raised_once_and_the_map_before_it_stays(tmp_path):
+    made = ef.map(ef.open(damaged_desk(tmp_path)), OPTIONS)
+    with pytest.raises(OSError, match="events.txt"):
+        made.points
+    assert len(made.points) > 1000
+    assert 0 < len(made.keyframes) == made.report["keyframes"]
+
+
+def test_events_are_read_without_poses_and_calibration(desk, tmp_path):
+    shutil.copy(os.path.join(DESK, "cam1", "events.txt"), tmp_path / "events.txt")
+    alone = ef.open(tmp_path / "events.txt")
+    part = next(alone.events(0, 1000))
+    np.testing.assert_array_equal(part, next(desk.events(1, 1000)))
+    assert len(alone.poses[0]) == 0 and alone.rig[0].K[0, 0] == 0
+    for unit, per in (("us", 1000), ("s", 1e9)):
+        np.testing.assert_allclose(next(alone.events(0, 1000, unit))["t"], part["t"] // per if unit == "us" else part["t"] / per)
+    with pytest.raises(OSError, match="--calibration"):
+        ef.map(alone).points
+
+
+def test_times_are_those_of_the_command_line(desk):
+    first = int(next(desk.events(0, 1))["t"][0])
+    for t0, expected in (("+0.25", first + 250_000_000), ("1.25", 1_250_000_000), (1_250_000_007, 1_250_000_007)):
+        part = next(ef.open(DESK, t0=t0).events(0, 1000))
+        assert part["t"][0] >= expected > part["t"][0] - 1_000_000
+
+
+def test_the_dsi_is_that_of_the_program(desk, tmp_path):
+    program("depth", DESK, "-q", "--t0", "1.5", "--t1", "1.75", "--save-dsi", "--out", tmp_path / "depth")
+    dsi = ef.dsi(desk, "1.5", "1.75")
+    values, depths = dsi
+    np.testing.assert_array_equal(values, np.load(tmp_path / "depth" / "dsi.npy"))
+    assert values.dtype == np.float32 and len(depths) == len(values) and np.all(np.diff(depths) > 0)
+    # A depth is near the best plane: the median of its neighbours is taken.
+    rows, columns = np.nonzero(dsi.keyframe.depth)
+    best = np.argmax(values[:, rows, columns], axis=0)
+    plane = np.interp(dsi.keyframe.depth[rows, columns], depths, np.arange(len(depths)))
+    assert np.mean(np.abs(plane - best) <= 3) > 0.9
+
+
+def test_the_info_is_that_of_the_program(desk):
+    info = desk.info()
+    text = program("info", DESK)
+    for camera in info["cameras"]:
+        assert f"{camera['events']} events from" in text and f"{camera['width']}x{camera['height']} pixels" in text
+    assert f"{info['poses'][0]['poses']} poses from" in text and info["poses"][0]["used"]
+    for option in info["chosen"]:
+        assert option["reason"] in text
+    assert desk.warnings() == []
+    events = os.path.join(DESK, "cam0", "events.txt")
+    assert "no-poses" in [name for name, _ in ef.open(events, sensor_size=(346, 260), t1="+0.2").warnings()]
+
+
+def test_errors_are_those_of_the_program(made, desk, folder, tmp_path):
+    assert ef.evaluate.depth(folder, DESK) == json.loads(program("evaluate", "depth", folder, DESK, "--json"))
+    assert ef.evaluate.map(folder, DESK) == json.loads(program("evaluate", "map", folder, DESK, "--json"))
+    of_path = ef.evaluate.trajectory(folder, DESK)
+    assert of_path == json.loads(program("evaluate", "trajectory", folder, DESK, "--json"))
+    # From memory: the same numbers, but for the names, and float32 in the PCD file.
+    for errors in (ef.evaluate.depth(made, desk), ef.evaluate.depth(iter(made), desk)):
+        assert errors["all"] == ef.evaluate.depth(folder, DESK)["all"]
+    for points in (made, made.points, np.stack([made.points[axis] for axis in "xyz"], 1)):
+        assert ef.evaluate.map(points, desk)["accuracy"] == ef.evaluate.map(folder, DESK)["accuracy"]
+    assert ef.evaluate.trajectory(made, desk)["pairs"] == of_path["pairs"]
+    keyframe = made.keyframes[0]
+    truth = ef.evaluate.true_depth(desk, keyframe.t)
+    np.save(tmp_path / "truth.npy", truth)
+    one = ef.evaluate.depth(keyframe.depth, truth)["all"]
+    assert one == ef.evaluate.depth(keyframe.depth, tmp_path / "truth.npy")["all"]
+    assert one["points"] == ef.evaluate.depth(folder, DESK)["maps"][0]["points"]
+
+
+def test_a_simulation_is_that_of_the_program(tmp_path):
+    program("simulate", "-q", "--preset", "slider", "--duration", "0.1", "--seed", "3", "--out", tmp_path / "program")
+    ef.simulate("slider", 3, duration=0.1, out=tmp_path / "python")
+    for file in glob.glob("**/*", root_dir=tmp_path / "program", recursive=True):
+        if (tmp_path / "program" / file).is_file():
+            assert (tmp_path / "python" / file).read_bytes() == (tmp_path / "program" / file).read_bytes(), file
+    temporary = ef.simulate("slider", duration=0.1)
+    path = temporary.files[0]
+    assert len(next(temporary.events())) > 0
+    del temporary
+    assert not os.path.exists(path)
+
+
+def test_a_live_mapper_maps_in_its_own_thread(desk):
+    keyframes = []
+    mapper = ef.Mapper({**OPTIONS, "live.enabled": True, "live.max_queue_mb": 1000}, keyframes.append)
+    mapper.add_recording(desk)
+    mapper.finish()
+    assert mapper.status == {"keyframes": len(keyframes), "drop_ratio": 0}
+    assert len(keyframes) > 1 and len(mapper.points) > 1000
+
+
+def test_warnings_are_warnings_of_python(desk):
+    inverted = ef.map(ef.open(DESK, poses=os.path.join(DESK, "poses.txt")), {**OPTIONS, "dsi.max_depth_m": 0.7})
+    with pytest.warns(ef.EventFusionWarning, match="depths-at-limit"):
+        inverted.points
+
+
+def test_figures_are_drawn_from_keyframes_and_arrays(made, desk, tmp_path):
+    keyframe = made.keyframes[0]
+    errors = ef.evaluate.depth(made, desk)
+    drawn = {
+        "depth": plot.depth(keyframe),
+        "array": plot.depth(keyframe.depth, limits=(0.5, 5)),
+        "empty": plot.depth(np.zeros((20, 30))),
+        "confidence": plot.confidence(keyframe),
+        "error": plot.error(keyframe, desk, tolerance_px=1),
+        "precision": plot.precision_recall(errors),
+        "completeness": plot.precision_recall(ef.evaluate.map(made, desk)),
+        "map": plot.map(made),
+        "points": plot.map(keyframe.points(), up=(0, -1, 0)),
+        "trajectory": plot.trajectory(desk, made, labels=["true", "map"]),
+    }
+    for name, axes in drawn.items():
+        assert isinstance(axes, matplotlib.axes.Axes)
+        axes.figure.savefig(tmp_path / f"{name}.pdf")
+        plot.pyplot.close(axes.figure)
+    same = plot.pyplot.figure().add_subplot()
+    assert plot.map(made, same) is same
+
+
+def test_the_error_picture_has_the_errors_of_the_evaluation(made, desk):
+    keyframe = made.keyframes[0]
+    for tolerance in (0, 1):
+        percent = plot.error(keyframe, desk, tolerance_px=tolerance).images[0].get_array()
+        shown = np.abs(np.ma.filled(percent, np.nan))
+        shown = shown[np.isfinite(shown)]
+        errors = ef.evaluate.depth(keyframe.depth, ef.evaluate.true_depth(desk, keyframe.t), tolerance_px=tolerance)["all"]
+        assert len(shown) == errors["points"]
+        assert abs(np.mean(shown > 10) - errors["beyond_tenth"]) < 1e-3  # relative to truth or estimate
+
+
+def test_types_are_right(tmp_path):
+    typed = [os.path.dirname(ef.__file__), *glob.glob(os.path.join(SOURCE, "examples", "python", "*.py"))]
+    mypy = [sys.executable, "-m", "mypy", "--config-file", os.path.join(SOURCE, "pyproject.toml"), "--cache-dir", tmp_path]
+    checked = subprocess.run([*mypy, *typed], capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout
+    # The compiled module has what its stub says. Its classes have another metaclass, and constructors without names.
+    (tmp_path / "allowed").write_text(r"event_fusion\._engine\.[A-Z]\w*(\.__init__)?" + "\n")
+    stubtest = [sys.executable, "-m", "mypy.stubtest", "event_fusion._engine", "--allowlist", tmp_path / "allowed"]
+    config = ["--mypy-config-file", os.path.join(SOURCE, "pyproject.toml"), "--ignore-unused-allowlist"]
+    checked = subprocess.run([*stubtest, *config], capture_output=True, text=True, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_the_examples_run(desk, folder, tmp_path):
+    def example(name, *arguments):
+        words = [sys.executable, os.path.join(SOURCE, "examples", "python", name), *map(str, arguments)]
+        environment = {**os.environ, "MPLBACKEND": "agg"}
+        return subprocess.run(words, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True).stdout
+
+    part = tmp_path / "part"
+    program("export", DESK, "-q", "--to", "folder", "--t0", "+0.5", "--duration", "0.6", "--out", part)
+    assert "points in own.pcd" in example("own_arrays.py", part)
+    assert "depth maps" in example("dsec_depth.py", part, "", "depths")
+    assert "pixels have a depth" in example("dsi_to_numpy.py", part, "+0.1", "+0.3")
+    assert example("option_study.py", part, "fusion.across_cameras", "min", "harmonic").count("wrong by") == 2
+    assert example("compare_maps.py", folder, "own.pcd", DESK).count("median error") == 2
+    keyframes = {os.path.splitext(file)[0] for file in os.listdir(tmp_path / "depths")}
+    assert len(keyframes) > 0
+    for file in ("own.pcd", "dsi.npz", "study.pdf", "compared.pdf", *(f"depths/{t}.npy" for t in keyframes)):
+        assert (tmp_path / file).stat().st_size > 1000, file
+    for lines in map(lambda file: open(file).read().count("\n"), glob.glob(os.path.join(SOURCE, "examples", "python", "*.py"))):
+        assert lines < 40

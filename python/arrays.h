@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// NumPy arrays of the engine's types, for the files of the module _engine.
+#pragma once
+
+#include <event_fusion/engine.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace efm {
+
+namespace py = pybind11;
+
+using Paths = std::vector<std::filesystem::path>;
+using Matrix4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+template <typename Matrix>
+Array arrayOf(const Matrix& matrix) {
+  Array array({matrix.rows(), matrix.cols()});
+  Eigen::Map<Matrix>(array.mutable_data()) = matrix;
+  return array;
+}
+
+template <typename Matrix>
+Matrix matrixOf(const Array& array, const char* name) {
+  const auto rows = Matrix::RowsAtCompileTime;
+  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != rows) {
+    throw std::invalid_argument(std::string(name) + ": expected a matrix of " +
+                                std::to_string(rows) + " x " + std::to_string(rows) + " numbers");
+  }
+  return Eigen::Map<const Matrix>(array.data());
+}
+
+inline Matrix4 matrixOf(const Rigid3& T_a_b) {
+  Matrix4 matrix = Matrix4::Identity();
+  matrix.topLeftCorner<3, 3>() = T_a_b.rotation.toRotationMatrix();
+  matrix.topRightCorner<3, 1>() = T_a_b.translation;
+  return matrix;
+}
+
+/// Returns the pose of a matrix, or of tx ty tz qx qy qz qw.
+/// @param name of the argument, for errors.
+inline Rigid3 rigidOf(const Array& array, const char* name) {
+  if (array.ndim() == 1 && array.size() == 7) {
+    const double* v = array.data();
+    const auto rotation =
+        rotationNear(Eigen::Quaterniond(v[6], v[3], v[4], v[5]));  // as of a TUM file
+    if (!rotation) {
+      throw std::invalid_argument(std::string(name) +
+                                  ": expected tx ty tz qx qy qz qw, with a quaternion of length 1");
+    }
+    return {*rotation, {v[0], v[1], v[2]}};
+  }
+  const auto T_a_b = transformNear(matrixOf<Matrix4>(array, name));
+  if (!T_a_b) {
+    throw std::invalid_argument(std::string(name) +
+                                ": expected [R t; 0 0 0 1] with a rotation matrix R");
+  }
+  return *T_a_b;
+}
+
+/// Returns a camera matrix.
+inline Array kOf(double fx, double fy, double cx, double cy) {
+  Matrix3 K;
+  K << fx, 0, cx, 0, fy, cy, 0, 0, 1;
+  return arrayOf(K);
+}
+
+/// Returns an array that shares the memory of `owner`, read-only.
+template <typename T, typename Owner>
+py::array sharedArray(const py::dtype& type, std::vector<py::ssize_t> shape,
+                      std::vector<py::ssize_t> strides, const T* data, Owner owner) {
+  const py::capsule base(new Owner(std::move(owner)),
+                         [](void* kept) { delete static_cast<Owner*>(kept); });
+  py::array array(type, std::move(shape), std::move(strides), data, base);
+  array.attr("flags").attr("writeable") = false;
+  return array;
+}
+
+inline py::array imageOf(const cv::Mat1f& image) {
+  return sharedArray(py::dtype::of<float>(), {image.rows, image.cols},
+                     {static_cast<py::ssize_t>(image.step[0]), sizeof(float)}, image.ptr<float>(),
+                     image);
+}
+
+inline py::array pointsOf(const MapCloud::ConstPtr& cloud) {
+  const py::dtype type(
+      py::cast(std::vector<std::string>{"x", "y", "z", "intensity", "support", "sigma"}),
+      py::cast(std::vector<std::string>{"f4", "f4", "f4", "f4", "u4", "f4"}),
+      py::cast(std::vector<std::size_t>{offsetof(MapPoint, x), offsetof(MapPoint, y),
+                                        offsetof(MapPoint, z), offsetof(MapPoint, intensity),
+                                        offsetof(MapPoint, support), offsetof(MapPoint, sigma)}),
+      sizeof(MapPoint));
+  return sharedArray(type, {static_cast<py::ssize_t>(cloud->size())}, {sizeof(MapPoint)},
+                     cloud->points.data(), cloud);
+}
+
+/// Poses as times (n,) in nanoseconds and matrices (n, 4, 4).
+inline py::tuple posesOf(const std::vector<StampedPose>& poses) {
+  const auto count = static_cast<py::ssize_t>(poses.size());
+  py::array_t<std::int64_t> times(count);
+  py::array_t<double> matrices({count, py::ssize_t{4}, py::ssize_t{4}});
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const StampedPose& pose = poses[static_cast<std::size_t>(i)];
+    times.mutable_at(i) = pose.t_ns;
+    Eigen::Map<Matrix4>(matrices.mutable_data(i)) = matrixOf(pose.T_world_rig);
+  }
+  return py::make_tuple(times, matrices);
+}
+
+/// Lets Ctrl-C end a long call.
+inline void checkSignals() {
+  const py::gil_scoped_acquire held;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
+/// Writes a map: PLY if the name says so, else PCD.
+inline void savePoints(const MapCloud& cloud, const std::filesystem::path& file) {
+  file.extension() == ".ply" ? writePly(file, cloud) : writePcd(file, cloud);
+}
+
+using OnKeyframe = std::function<void(const std::shared_ptr<const Keyframe>&)>;
+
+/// Gives a keyframe to Python: a copy shares the images.
+inline void give(const Keyframe& keyframe, const OnKeyframe& on_keyframe) {
+  const py::gil_scoped_acquire held;
+  on_keyframe(std::make_shared<const Keyframe>(keyframe));
+}
+
+/// Defines the functions that map, evaluate and simulate.
+void defineJobs(py::module_& module);
+
+}  // namespace efm

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Arrays of events, times and options."""
+
+from __future__ import annotations
+
+import os
+from decimal import Decimal, InvalidOperation
+from typing import Any, Callable, Mapping, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _engine
+from ._engine import EVENT_DTYPE
+
+Array = npt.NDArray[Any]
+Path = Union[str, "os.PathLike[str]"]
+Options = Union[Mapping[str, Any], Path]
+#: True shows a bar of tqdm, where it is installed. A function gets the activity and the fraction that is done.
+Progress = Union[bool, Callable[[str, float], Any]]
+
+_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+_TIMES = ("t", "ts", "timestamp")
+_POLARITIES = ("p", "polarity")
+
+
+class EventFusionWarning(UserWarning):
+    """A warning of the engine: its name, a colon and its text. The lists ``warnings`` have them, too."""
+
+
+def _ns_per(time_unit: str) -> int:
+    if time_unit not in _NS_PER:
+        raise ValueError(f"time_unit = {time_unit!r}: expected one of {', '.join(_NS_PER)}")
+    return _NS_PER[time_unit]
+
+
+def _pixels(name: str, column: Array) -> Array:
+    if column.dtype.kind in "ub" and column.dtype.itemsize <= 2:
+        return column
+    fits = (column >= 0) & (column <= 65535)
+    if column.dtype.kind == "f":
+        fits &= column == np.floor(column)
+    if not fits.all():
+        wrong = int(np.argmin(fits))
+        raise ValueError(f"{name}[{wrong}] = {column[wrong]}: expected a whole number from 0 to 65535")
+    return column
+
+
+def events(x: npt.ArrayLike, y: npt.ArrayLike, p: npt.ArrayLike, t: npt.ArrayLike, time_unit: str = "ns") -> Array:
+    """Make an event array of four columns.
+
+    Parameters
+    ----------
+    x, y : array_like of int, shape (n,)
+        Pixels, from 0.
+    p : array_like, shape (n,)
+        Polarity: above 0, or True, if the pixel became brighter.
+    t : array_like, shape (n,)
+        Times. Integers keep all digits.
+    time_unit : {'ns', 'us', 'ms', 's'}
+        Unit of `t`.
+
+    Returns
+    -------
+    numpy.ndarray
+        Of dtype `EVENT_DTYPE`; its times are nanoseconds.
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ, a pixel is not in 0 to 65535, or the unit is unknown.
+
+    Examples
+    --------
+    >>> events([3], [4], [1], [2.5], time_unit="us")["t"]
+    array([2500])
+    """
+    factor = _ns_per(time_unit)
+    columns = [np.asarray(column) for column in (x, y, p, t)]
+    if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
+        shapes = ", ".join(str(column.shape) for column in columns)
+        raise ValueError(f"x, y, p, t have the shapes {shapes}: expected four columns of one length")
+    made = np.empty(len(columns[0]), EVENT_DTYPE)
+    made["x"] = _pixels("x", columns[0])
+    made["y"] = _pixels("y", columns[1])
+    made["p"] = columns[2] > 0
+    times = columns[3]
+    if times.dtype.kind == "f":
+        if not np.all(np.isfinite(times)):
+            raise ValueError("t: expected finite times")
+        made["t"] = np.rint(times * factor)
+    else:
+        made["t"] = times
+        if factor != 1:
+            made["t"] *= factor
+    return made
+
+
+def event_records(array: npt.ArrayLike, time_unit: str = "ns") -> Array:
+    """Return a structured array of events as `EVENT_DTYPE`: the same array if it has this layout.
+
+    Other arrays are read by the names of their fields: x, y, p (or polarity) and t (or ts, timestamp).
+    """
+    records = np.asarray(array)
+    if time_unit == "ns" and records.dtype == EVENT_DTYPE:
+        return np.ascontiguousarray(records)
+    names = records.dtype.names or ()
+    time = next((name for name in _TIMES if name in names), None)
+    polarity = next((name for name in _POLARITIES if name in names), None)
+    if time is None or polarity is None or "x" not in names or "y" not in names:
+        raise TypeError(
+            f"events of {records.dtype}: expected a structured array with the fields x, y, p, t; "
+            "event_fusion.events makes one of four columns"
+        )
+    return events(records["x"], records["y"], records[polarity], records[time], time_unit)
+
+
+def in_unit(records: Array, time_unit: str) -> Array:
+    """Return events with their times in another unit: floats for 's', else integers, rounded down."""
+    if time_unit == "ns":
+        return records
+    if time_unit == "s":
+        made = np.empty(len(records), [("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<f8")])
+        for name in "xyp":
+            made[name] = records[name]
+        made["t"] = records["t"] * 1e-9
+        return made
+    records["t"] //= _ns_per(time_unit)
+    return records
+
+
+def nanoseconds(name: str, time: int | str | None, start: Callable[[], int | None]) -> int | None:
+    """Return a time as nanoseconds: integers are such; '3.2' is seconds, '+3.2' counts from the first event."""
+    if time is None or isinstance(time, (int, np.integer)):
+        return None if time is None else int(time)
+    try:
+        ns = int((Decimal(time) * 10**9).to_integral_value())
+    except (InvalidOperation, TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} = {time!r}: expected nanoseconds (int), or seconds as a str: '3.2', '+3.2'") from None
+    if not time.strip().startswith("+"):
+        return ns
+    first = start()
+    if first is None:
+        raise ValueError(f"{name} = {time!r}: the recording has no event to count from")
+    return first + ns
+
+
+def engine_options(options: Options | None) -> _engine.Options:
+    """Return the engine's options of a mapping with keys of the .ini files, or of a file, checked."""
+    made = _engine.Options()
+    if isinstance(options, (str, os.PathLike)):
+        made.read(os.fspath(options))
+    else:
+        for key, value in (options or {}).items():
+            if isinstance(value, (bool, np.bool_)):
+                value = str(value).lower()
+            elif isinstance(value, (list, tuple, np.ndarray)):
+                value = ",".join(str(part) for part in value)
+            made.set(key, str(value))
+    made.validate()
+    return made
+
+
+class ProgressBar:
+    """Calls of the engine, as the progress that a user asked for. A context: its end closes the bar."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._callback = progress if callable(progress) else None
+        self._bar: Any = None
+        self._make: Any = None
+        if progress is True:
+            try:
+                from tqdm.auto import tqdm
+
+                self._make = tqdm
+            except ImportError:
+                pass
+
+    def __call__(self, activity: str, fraction: float) -> None:
+        if self._callback is not None:
+            self._callback(activity, fraction)
+        if self._make is None:
+            return
+        if self._bar is None or self._bar.desc != activity:
+            self.close()
+            shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+            self._bar = self._make(total=100, desc=activity, leave=False, bar_format=shown)
+            self._bar.desc = activity
+        self._bar.update(100 * fraction - self._bar.n)
+
+    @property
+    def used(self) -> bool:
+        """Whether anybody gets the progress."""
+        return self._callback is not None or self._make is not None
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None

@@ -1,0 +1,434 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Maps of recordings and of arrays."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import threading
+import warnings as python_warnings
+import weakref
+from functools import cached_property
+from typing import Any, Callable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _engine
+from ._engine import Camera, Keyframe
+from ._events import (
+    Array,
+    EventFusionWarning,
+    Options,
+    Path,
+    Progress,
+    ProgressBar,
+    engine_options,
+    event_records,
+    nanoseconds,
+)
+from ._recording import Recording
+
+
+def _warn(found: list[tuple[str, str]]) -> None:
+    for name, text in found:
+        python_warnings.warn(f"{name}: {text}", EventFusionWarning, stacklevel=4)
+
+
+class Mapper:
+    """Turns events and poses into keyframes and one map, in memory: from own arrays, beside a sensor or later.
+
+    Parameters
+    ----------
+    options : mapping of str to str, number or bool; or path
+        Keys of the .ini files, or such a file, or the name of an installed one: "davis346_mvsec".
+    on_keyframe : callable
+        Called with each `Keyframe`, in the order of their windows. Its exceptions end the call that maps; with
+        ``live.enabled``, where a thread of the mapper calls it, they are counted and given to `on_warning`.
+    on_warning : callable
+        Called with the text of losses and errors of live operation, and of poses that do not explain the events.
+
+    Raises
+    ------
+    ValueError
+        If an option is unknown or out of range.
+
+    Notes
+    -----
+    Automatic options are chosen at `finish`, or when ``live.max_queue_mb`` of events wait: nothing is mapped before.
+    With ``{"live.enabled": True}`` adding never waits, and `points` is the newest map.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import event_fusion as ef
+    >>> mapper = ef.Mapper({"dsi.min_depth_m": 1, "dsi.max_depth_m": 5})
+    >>> mapper.add_camera(ef.Camera(346, 260, np.array([[226, 0, 173], [0, 226, 130], [0, 0, 1]])))
+    0
+    """
+
+    def __init__(
+        self,
+        options: Options | None = None,
+        on_keyframe: Callable[[Keyframe], Any] | None = None,
+        on_warning: Callable[[str], Any] | None = None,
+    ) -> None:
+        self._mapper = _engine.Mapper(engine_options(options), on_keyframe, on_warning)
+
+    def add_camera(self, camera: Camera) -> int:
+        """Add a camera and return its index, from 0. All cameras come before the events."""
+        return self._mapper.add_camera(camera)
+
+    def add_events(self, camera: int, array: npt.ArrayLike, time_unit: str = "ns") -> None:
+        """Add the next events of a camera, on the camera's clock.
+
+        Parameters
+        ----------
+        camera : int
+            Index that `add_camera` returned.
+        array : structured array
+            Fields x, y, p (or polarity) and t (or ts, timestamp). Events that are up to 10 ms out of order are sorted.
+        time_unit : {'ns', 'us', 'ms', 's'}
+            Unit of the times.
+
+        Raises
+        ------
+        ValueError
+            If an event is outside the sensor or older than that, or if there is no such camera. No event of the call
+            is added then.
+        TypeError
+            If the array has not these fields.
+        """
+        self._mapper.add_events(camera, event_records(array, time_unit))
+
+    def add_pose(self, t: int, T_world_rig: npt.ArrayLike) -> None:
+        """Add the next pose, on the clock of the events. Events and poses may come in any order.
+
+        Parameters
+        ----------
+        t : int
+            Nanoseconds.
+        T_world_rig : array_like, shape (4, 4) or (7,)
+            A matrix, or tx ty tz qx qy qz qw as in a TUM file. (The last digits of a map depend on it: the rotation of
+            a matrix is rounded when it becomes a quaternion.)
+
+        Raises
+        ------
+        ValueError
+            If the pose is not finite or not rigid, or a second older than the newest one.
+        """
+        self._mapper.add_pose(t, T_world_rig)
+
+    def add_recording(self, recording: Recording) -> None:
+        """Add the events and poses of a recording, in the order of time; Ctrl-C ends it."""
+        self._mapper.add_recording(recording._source)
+
+    def finish(self) -> None:
+        """End the input, and map the rest. The warnings are Python's `EventFusionWarning`, too."""
+        self._mapper.finish()
+        _warn(self.warnings)
+
+    def stop(self) -> None:
+        """End without mapping the rest."""
+        self._mapper.stop()
+
+    def save(self, path: Path) -> None:
+        """Write the points as PLY, if the name ends so, else as PCD."""
+        self._mapper.save(os.fspath(path))
+
+    @property
+    def points(self) -> Array:
+        """The map: a structured array with x, y, z (metres), intensity, support, sigma (metres); read-only."""
+        return self._mapper.points()
+
+    @property
+    def trajectory(self) -> tuple[Array, Array]:
+        """Times (n,) of the keyframes, nanoseconds, and T_world_ref (n, 4, 4)."""
+        return self._mapper.trajectory()
+
+    @property
+    def warnings(self) -> list[tuple[str, str]]:
+        """Names and texts of the warnings so far."""
+        return self._mapper.warnings()
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """Number of keyframes, and the fraction of the events that live operation dropped."""
+        keyframes, dropped = self._mapper.status()
+        return {"keyframes": keyframes, "drop_ratio": dropped}
+
+
+def _run(items: queue.Queue[Any], job: Callable[[Callable[[Keyframe], None]], _engine.MapResult]) -> None:
+    """Map in a thread: keyframes go into the queue, then the result or the exception."""
+    try:
+        items.put(job(items.put))
+    except BaseException as error:  # the caller's thread raises it
+        items.put(error)
+
+
+def _end(stop: _engine.StopFlag, items: queue.Queue[Any], thread: threading.Thread) -> None:
+    """End a mapping whose result nobody waits for."""
+    stop.set()
+    while thread.is_alive() and thread is not threading.current_thread():
+        try:
+            items.get(timeout=0.02)
+        except queue.Empty:
+            pass
+
+
+class Map:
+    """The map of a recording: see `map`. Keyframes come while the recording is mapped.
+
+    A loop over the map, or `keyframes`, gives them in the order of time; `points`, `trajectory`, `report` and
+    `warnings` wait for the end. ``len`` is the number of keyframes.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        options: Options | None,
+        out: Path | None,
+        force: bool,
+        keep: bool,
+        progress: Progress,
+    ) -> None:
+        checked = engine_options(options)
+        self._keep = keep
+        self._made: list[Keyframe] = []
+        self._result: _engine.MapResult | None = None
+        self._error: BaseException | None = None
+        self._bar = ProgressBar(progress)
+        stop = _engine.StopFlag()
+        # With `keep`, the mapping need not wait for the loop.
+        items: queue.Queue[Any] = queue.Queue(0 if keep else 2)
+        on_progress = self._bar if self._bar.used else None
+        folder = "" if out is None else os.fspath(out)
+        source = recording._source
+
+        def job(on_keyframe: Callable[[Keyframe], None]) -> _engine.MapResult:
+            return _engine.run_map(source, checked, folder, force, stop, on_keyframe, on_progress)
+
+        self._recording = recording  # a simulated one is removed with its last user
+        self._items = items
+        self._thread = threading.Thread(target=_run, args=(items, job), daemon=True, name="event_fusion.map")
+        self._close = weakref.finalize(self, _end, stop, items, self._thread)
+        self._thread.start()
+
+    def _next(self) -> Keyframe | None:
+        """Wait for the next keyframe; None at the end."""
+        if self._result is not None:
+            return None
+        if self._error is not None:
+            raise self._error
+        try:
+            item = self._items.get()
+        except BaseException as error:  # Ctrl-C
+            self._error = error
+            self.close()
+            raise
+        if isinstance(item, Keyframe):
+            if self._keep:
+                self._made.append(item)
+            return item
+        self._bar.close()
+        if isinstance(item, BaseException):
+            self._error = item
+            raise item
+        self._result = item
+        _warn(self.warnings)
+        item.reject_error()
+        return None
+
+    def _finished(self) -> _engine.MapResult:
+        while self._next() is not None:
+            pass
+        assert self._result is not None
+        return self._result
+
+    def __iter__(self) -> Iterator[Keyframe]:
+        if not self._keep:
+            while (keyframe := self._next()) is not None:
+                yield keyframe
+            return
+        at = 0
+        while at < len(self._made) or self._next() is not None:
+            yield self._made[at]
+            at += 1
+
+    def __len__(self) -> int:
+        return len(self._finished().trajectory[0])
+
+    def __repr__(self) -> str:
+        state = "made" if self._result is not None else "ended" if self._error is not None else "being made"
+        return f"<Map of {self._recording!r}: {state}, {len(self._made)} keyframes kept>"
+
+    def close(self) -> None:
+        """End the mapping, if it goes on. A folder has the map so far."""
+        self._close()
+        self._bar.close()
+        if self._result is None and self._error is None:
+            self._error = RuntimeError("the map was closed before its end")
+
+    @property
+    def keyframes(self) -> list[Keyframe]:
+        """All keyframes."""
+        if not self._keep:
+            raise RuntimeError("keep=False: a loop over the map gives each keyframe once")
+        self._finished()
+        return self._made
+
+    @cached_property
+    def points(self) -> Array:
+        """The map: a structured array with x, y, z (metres), intensity, support, sigma (metres); read-only."""
+        return self._finished().points
+
+    @property
+    def trajectory(self) -> tuple[Array, Array]:
+        """Times (n,) of the keyframes, nanoseconds, and T_world_ref (n, 4, 4)."""
+        return self._finished().trajectory
+
+    @property
+    def tracker_trajectory(self) -> tuple[Array, Array]:
+        """The same by the tracker: it differs if ``refinement.enabled`` corrects keyframes."""
+        return self._finished().tracker_trajectory
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """The content of report.json: counts, times, options, what was chosen and why."""
+        report: dict[str, Any] = json.loads(self._finished().report)
+        return report
+
+    @property
+    def warnings(self) -> list[tuple[str, str]]:
+        """Names and texts of the warnings."""
+        return [(warning["name"], warning["text"]) for warning in self.report["warnings"]]
+
+    @property
+    def doubts(self) -> list[str]:
+        """Reasons why the map has little evidence; usually none."""
+        return self._finished().doubts
+
+    def save(self, path: Path) -> None:
+        """Write the points as PLY, if the name ends so, else as PCD."""
+        self._finished().save(os.fspath(path))
+
+
+def map(
+    recording: Recording,
+    options: Options | None = None,
+    out: Path | None = None,
+    *,
+    force: bool = False,
+    keep: bool = True,
+    progress: Progress = False,
+) -> Map:
+    """Map a recording, as ``event-fusion map`` does.
+
+    Parameters
+    ----------
+    recording : Recording
+        See `open`.
+    options : mapping of str to str, number or bool; or path
+        Keys of the .ini files, or such a file, or the name of an installed one. What is not given has its default.
+    out : path
+        A folder for all that the program writes: map.pcd, map.html, pictures, report.json. By default no file.
+    force : bool
+        Allow a folder that holds other files.
+    keep : bool
+        False: a keyframe lives as long as the loop uses it, so that memory does not grow with the recording.
+    progress : bool or callable
+        True: a bar, where tqdm is installed. A function gets the activity and the fraction that is done, ten times a
+        second, in another thread; its exceptions end the mapping.
+
+    Returns
+    -------
+    Map
+        Keyframes as they come. Wrong input is found while mapping: what uses the map raises the error, once; after
+        that, the map of what came before the damage can be used.
+
+    Raises
+    ------
+    ValueError
+        If an option is unknown or out of range.
+    OSError
+        If the recording cannot be read to its end, has no keyframe, or a file cannot be written.
+    """
+    return Map(recording, options, out, force, keep, progress)
+
+
+class Dsi(tuple):  # type: ignore[type-arg]
+    """A disparity space image: ``values, depths = dsi``.
+
+    Attributes
+    ----------
+    values : numpy.ndarray, float32, shape (planes, rows, columns)
+        Fused ray densities; read-only.
+    depths : numpy.ndarray, float64, shape (planes,)
+        Metres along z of the view, nearest first.
+    keyframe : Keyframe
+        The view, as `Keyframe.pose` and `Keyframe.K`, and the depth map of the DSI.
+    """
+
+    keyframe: Keyframe
+
+    @property
+    def values(self) -> Array:  # noqa: D102
+        values: Array = self[0]
+        return values
+
+    @property
+    def depths(self) -> Array:  # noqa: D102
+        depths: Array = self[1]
+        return depths
+
+
+def dsi(
+    recording: Recording,
+    t0: int | str,
+    t1: int | str,
+    options: Options | None = None,
+    *,
+    t_ref: int | str | None = None,
+    progress: Progress = False,
+) -> Dsi:
+    """Map one window and return its whole DSI, as ``event-fusion depth --save-dsi`` does.
+
+    Parameters
+    ----------
+    recording : Recording
+        See `open`.
+    t0, t1 : int or str
+        The window [t0, t1): nanoseconds, or text as in `open`.
+    options : mapping or path
+        See `map`.
+    t_ref : int or str
+        Time of the view; by default the middle of the window.
+    progress : bool or callable
+        See `map`; in the caller's thread.
+
+    Raises
+    ------
+    ValueError
+        If an option is out of range, or t1 is not above t0.
+    OSError
+        If the recording cannot be read, or the window has no keyframe.
+    """
+
+    def start() -> int | None:
+        return _engine.first_event(recording._source)
+
+    t0_ns, t1_ns, t_ref_ns = (
+        nanoseconds(name, time, start) for name, time in (("t0", t0), ("t1", t1), ("t_ref", t_ref))
+    )
+    checked = engine_options(options)
+    bar = ProgressBar(progress)
+    try:
+        values, depths, keyframe = _engine.run_dsi(
+            recording._source, checked, t0_ns, t1_ns, t_ref_ns, bar if bar.used else None
+        )
+    finally:
+        bar.close()
+    made = Dsi((values, depths))
+    made.keyframe = keyframe
+    return made

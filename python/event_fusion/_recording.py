@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings, read and simulated."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import tempfile
+from functools import cached_property
+from typing import Any, Iterator, Sequence
+
+from . import _engine
+from ._engine import Camera
+from ._events import Array, Path, Progress, ProgressBar, in_unit, nanoseconds, _ns_per
+
+
+class Recording:
+    """Events and poses of one recording, in any format that the program ``event-fusion`` reads. See `open`.
+
+    Attributes
+    ----------
+    rig : list of Camera
+        The cameras. The focal lengths of `Camera.K` are 0 where no calibration is known.
+    files : list of str
+        The files and folders.
+    """
+
+    def __init__(self, files: Sequence[str], source: _engine.Source) -> None:
+        self.files = list(files)
+        self._source = source
+        self.rig: list[Camera] = _engine.read_rig(source)
+
+    def __repr__(self) -> str:
+        return f"<Recording {', '.join(self.files)}: {len(self.rig)} cameras>"
+
+    def events(self, camera: int = 0, chunk: int = 1_000_000, time_unit: str = "ns") -> Iterator[Array]:
+        """Read the events of a camera in the order of time.
+
+        Parameters
+        ----------
+        camera : int
+            Index in `rig`.
+        chunk : int
+            Maximum number of events of an array. Memory does not grow with the recording.
+        time_unit : {'ns', 'us', 'ms', 's'}
+            Unit of the times: integers, rounded down; floats for 's'.
+
+        Yields
+        ------
+        numpy.ndarray, shape (n,), dtype EVENT_DTYPE
+            Fields x, y, p (0 or 1) and t.
+
+        Raises
+        ------
+        OSError
+            At damage, after the events before it. It names file, place, value and what was expected.
+        ValueError
+            If there is no such camera, `chunk` is below 1, or the unit is unknown.
+        """
+        if not 0 <= camera < len(self.rig):
+            raise ValueError(f"camera = {camera}: expected a camera of the recording: 0 to {len(self.rig) - 1}")
+        if chunk < 1:
+            raise ValueError(f"chunk = {chunk}: expected 1 or above")
+        _ns_per(time_unit)
+        return self._read(camera, chunk, time_unit)
+
+    def _read(self, camera: int, chunk: int, time_unit: str) -> Iterator[Array]:
+        reader = _engine.EventReader(self._source)
+        while len(part := reader.next(camera, chunk)) > 0:
+            yield in_unit(part, time_unit)
+
+    @cached_property
+    def poses(self) -> tuple[Array, Array]:
+        """Poses of the rig: times (n,), int64, nanoseconds, and T_world_rig (n, 4, 4), float64.
+
+        Read once, at the first use: this reads the whole recording. Without poses both are empty.
+        """
+        return _engine.read_poses(self._source)
+
+    @cached_property
+    def _info(self) -> dict[str, Any]:
+        info: dict[str, Any] = json.loads(_engine.read_info(self._source))
+        return info
+
+    def info(self) -> dict[str, Any]:
+        """Read the whole recording, once, and return what ``event-fusion info`` says of it.
+
+        Returns
+        -------
+        dict
+            observations; cameras (name, width, height, calibrated, events, first_ns, last_ns, per_second, positive);
+            poses, by source (source, used, poses, first_ns, last_ns, per_second, max_gap_s, path_m, max_speed_m_s,
+            max_rotation_rad_s); events_before_poses, events_after_poses; others; sorted_events; true_depth_maps;
+            chosen (key, value, reason: the options that `map` would choose); warnings (name, text).
+
+        Raises
+        ------
+        OSError
+            If the recording cannot be read to its end.
+        """
+        return self._info
+
+    def warnings(self) -> list[tuple[str, str]]:
+        """Return names and texts of what looks wrong in the recording; reads it as `info` does."""
+        return [(warning["name"], warning["text"]) for warning in self._info["warnings"]]
+
+
+def open(
+    path: Path | Sequence[Path],
+    *,
+    poses: Path = "",
+    calibration: Path = "",
+    hand_eye: Path = "",
+    t0: int | str | None = None,
+    t1: int | str | None = None,
+    format: str = "auto",
+    topics: Sequence[str] = (),
+    event_columns: str = "",
+    time_unit: str = "",
+    sensor_size: tuple[int, int] | None = None,
+    skip_bad_events: int = 0,
+) -> Recording:
+    """Open a recording.
+
+    Parameters
+    ----------
+    path : path or sequence of paths
+        Files and folders of one recording. To read its events, neither poses nor a calibration are needed.
+    poses, calibration, hand_eye : path
+        Files that replace those of the recording, as ``--poses``, ``--calibration`` and ``--hand-eye`` do.
+    t0, t1 : int or str
+        Only the events of [t0, t1) are read. Integers: nanoseconds on the clock of the poses. Text as on the command
+        line: ``"3.2"`` is seconds on that clock, ``"+3.2"`` seconds from the first event on.
+    format, topics, event_columns, time_unit, sensor_size, skip_bad_events
+        What cannot be found in the files: the options of the command line with these names. `sensor_size` is (width,
+        height).
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read. It names file, place, value and what was expected. An option that it names, such as
+        ``--sensor-size 346x260``, is the argument of that name here: ``sensor_size=(346, 260)``.
+    ValueError
+        If a time cannot be read, or t1 is not above t0.
+    """
+    files = [os.fspath(file) for file in ([path] if isinstance(path, (str, os.PathLike)) else path)]
+    given = (os.fspath(poses), os.fspath(calibration), os.fspath(hand_eye))
+    source = _engine.Source(
+        files, *given, format, list(topics), event_columns, time_unit, sensor_size, skip_bad_events
+    )
+
+    def start() -> int | None:
+        return _engine.first_event(source)
+
+    source.set_limits(nanoseconds("t0", t0, start), nanoseconds("t1", t1, start))
+    return Recording(files, source)
+
+
+def simulate(
+    preset: str = "desk_stereo",
+    seed: int = 1,
+    *,
+    duration: float | None = None,
+    out: Path | None = None,
+    progress: Progress = False,
+) -> Recording:
+    """Simulate a recording with exact ground truth.
+
+    Parameters
+    ----------
+    preset : str
+        One of `simulation_presets`.
+    seed : int
+        Seed of all random values.
+    duration : float
+        Seconds, 0.001 to 600; by default the preset's.
+    out : path
+        The new folder of the recording. By default a temporary one, which lives as long as the result.
+    progress : bool or callable
+        See `map`.
+
+    Returns
+    -------
+    Recording
+        With true depth maps and clouds beside it, for `event_fusion.evaluate`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset, or the duration is out of range.
+    OSError
+        If the folder exists and is not empty, or cannot be written.
+    """
+    temporary = tempfile.TemporaryDirectory(prefix="event_fusion_") if out is None else None
+    folder = os.fspath(out) if out is not None else str(pathlib.Path(temporary.name) / preset)  # type: ignore[union-attr]
+    bar = ProgressBar(progress)
+    try:
+        _engine.simulate(folder, preset, seed, duration, bar if bar.used else None)
+    finally:
+        bar.close()
+    recording = open(folder)
+    recording._temporary = temporary  # type: ignore[attr-defined]  # removed with the recording
+    return recording

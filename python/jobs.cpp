@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whole recordings: mapped, evaluated and simulated as the program does.
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "arrays.h"
+#include "mapping/base/atomic_file.h"
+#include "plugin/evaluation/cloud_evaluation.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/depth_file.h"
+#include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/playback/map_job.h"
+#include "plugin/playback/recording_info.h"
+#include "tracking_stub/presets/presets.h"
+#include "tracking_stub/truth/dataset_writer.h"
+
+namespace efm {
+namespace {
+
+using StopFlag = std::atomic<bool>;
+using OnProgress = std::function<void(const std::string& activity, double fraction)>;
+
+/// Gives the progress to Python ten times a second.
+class ProgressCalls {
+ public:
+  explicit ProgressCalls(OnProgress on_progress) : on_progress_(std::move(on_progress)) {}
+
+  void operator()(const char* activity, double fraction) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!on_progress_ || now < next_) return;
+    next_ = now + std::chrono::milliseconds(100);
+    const py::gil_scoped_acquire held;
+    on_progress_(activity, fraction);
+  }
+
+ private:
+  OnProgress on_progress_;
+  std::chrono::steady_clock::time_point next_{};
+};
+
+MapJob jobOf(const RecordingSource& source, const Options& options, const OnKeyframe& on_keyframe,
+             const OnProgress& on_progress) {
+  MapJob job;
+  job.source = source;
+  job.options = options.values();
+  job.options.mapper.limits = source.limits;
+  job.on_keyframe = [on_keyframe](const Keyframe& keyframe, const MappingRun&) {
+    give(keyframe, on_keyframe);
+  };
+  job.on_progress = ProgressCalls(on_progress);
+  job.prepare();
+  return job;
+}
+
+MapResult mapRecordingInto(const RecordingSource& source, const Options& options,
+                           const std::filesystem::path& out, bool force,
+                           const std::shared_ptr<StopFlag>& stop, const OnKeyframe& on_keyframe,
+                           const OnProgress& on_progress) {
+  MapJob job = jobOf(source, options, on_keyframe, on_progress);
+  job.out = out;
+  job.force = force;
+  job.stop = [stop] { return stop->load(); };
+  return mapInto(std::move(job));
+}
+
+/// Throws the error of a result, as Python's translators know it.
+void rejectError(const MapResult& result) {
+  if (!result.error) return;
+  if (result.error->wrong) throw std::invalid_argument(result.error->text);
+  throw std::runtime_error(result.error->text);
+}
+
+/// The DSI of a window, its depths and its keyframe.
+struct WindowDsi {
+  std::vector<float> values;  // planes, rows, columns
+  cv::Size size;
+  int num_planes = 0;
+  std::mutex mutex;
+
+  void addPlane(int plane, int planes, const cv::Mat1f& from) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      size = from.size();
+      num_planes = planes;
+      values.resize(static_cast<std::size_t>(planes) * from.total());
+    }
+    std::memcpy(&values[static_cast<std::size_t>(plane) * from.total()], from.ptr(),
+                from.total() * sizeof(float));
+  }
+};
+
+py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int64_t t0_ns,
+                 std::int64_t t1_ns, std::optional<std::int64_t> t_ref_ns,
+                 const OnProgress& on_progress) {
+  auto dsi = std::make_shared<WindowDsi>();
+  std::shared_ptr<const Keyframe> made;
+  MapResult result;
+  {
+    const py::gil_scoped_release released;
+    MapJob job = jobOf(source, options, nullptr, on_progress);
+    FusionMapperOptions& mapper = job.options.mapper;
+    mapper.only_window = windowOf(t0_ns, t1_ns, mapper.policy.reference);
+    if (t_ref_ns) mapper.only_window->t_ref_ns = *t_ref_ns;
+    job.options.mapper.validate();
+    job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
+      made = std::make_shared<const Keyframe>(keyframe);
+    };
+    job.on_dsi_plane = [&](int plane, int planes, const cv::Mat1f& values) {
+      dsi->addPlane(plane, planes, values);
+    };
+    result = mapWindowInto(std::move(job));
+    rejectError(result);
+  }
+  const auto& planes = result.report.options.mapper.keyframe.planes;
+  py::array_t<double> depths(planes.num_planes);
+  for (int plane = 0; plane < planes.num_planes; ++plane) {
+    depths.mutable_at(plane) = DepthPlanes(planes).depth(plane);
+  }
+  const py::ssize_t row = dsi->size.width * py::ssize_t{sizeof(float)};
+  const py::array values = sharedArray(
+      py::dtype::of<float>(), {dsi->num_planes, dsi->size.height, dsi->size.width},
+      {row * dsi->size.height, row, py::ssize_t{sizeof(float)}}, dsi->values.data(), dsi);
+  return py::make_tuple(values, depths, made);
+}
+
+std::string infoOf(const RecordingSource& source) {
+  const RecordingInfo info = readInfo(source, [](double) { checkSignals(); });
+  if (info.error) std::rethrow_exception(info.error);
+  return infoJson(info);
+}
+
+void simulateInto(const std::filesystem::path& out, const std::string& preset, std::uint64_t seed,
+                  std::optional<double> duration_s, const OnProgress& on_progress) {
+  const Simulation simulation = makeSimulation({preset, duration_s, seed});
+  NewFolder folder(out);  // reports errors before the simulation runs
+  SimulationRun run;
+  run.progress = [progress = ProgressCalls(on_progress)](double fraction) mutable {
+    checkSignals();
+    progress("simulating", fraction);
+  };
+  writeDataset(folder.temporary(), simulation, simulateEvents(simulation, run), checkSignals);
+  folder.finish();
+}
+
+using Path = std::filesystem::path;
+
+std::string depthErrorJson(const Path& estimate, const Path& truth, int tolerance_px,
+                           std::optional<double> max_depth_m, std::optional<double> png_scale,
+                           const Path& mask, const std::vector<double>& thresholds_m) {
+  DepthEvaluationOptions options;
+  options.pairing.tolerance_px = tolerance_px;
+  if (max_depth_m) options.pairing.max_depth_m = *max_depth_m;
+  options.png_scale = png_scale;
+  options.mask = mask;
+  if (!thresholds_m.empty()) options.thresholds_m = thresholds_m;
+  const auto stereo = findStereoBaseline(estimate, truth);
+  if (stereo) options.focal_baseline = stereo->focal_px * stereo->baseline_m;
+  return evaluationJson(evaluateDepth(estimate, truth, options), stereo);
+}
+
+std::string cloudErrorJson(const Path& estimate, const Path& truth, bool align, const Path& to_find,
+                           const std::vector<double>& distances_m) {
+  CloudEvaluationOptions options;
+  options.align = align;
+  options.to_find = to_find;
+  if (!distances_m.empty()) options.distances_m = distances_m;
+  return evaluationJson(evaluateCloud(estimate, truth, options));
+}
+
+std::string trajectoryErrorJson(const Path& estimate, const Path& truth,
+                                const std::string& alignment, double max_difference_s) {
+  TrajectoryEvaluationOptions options;
+  options.alignment = valueIn(kTrajectoryAlignments, alignment);
+  options.max_difference_s = max_difference_s;
+  return evaluationJson(evaluateTrajectory(estimate, truth, options));
+}
+
+/// Returns the true depth map of a folder that is nearest to a time, at most 1 ms away.
+py::array trueDepth(const Path& folder, std::int64_t t_ns) {
+  const std::vector<TimedFile> series = depthSeries(folder, DepthSeriesRole::kTruth);
+  const TimedFile* nearest = nearestFile(series, t_ns, 1'000'000);
+  if (nearest == nullptr) {
+    throw std::runtime_error(folder.string() + ": none of its " + std::to_string(series.size()) +
+                             " depth maps is within 1 ms of t = " + std::to_string(t_ns) + " ns");
+  }
+  return imageOf(readDepthFile(nearest->file));
+}
+
+void writePoses(const Path& file, const py::array_t<std::int64_t>& times_ns,
+                const Array& T_world_rig) {
+  const py::ssize_t count = times_ns.size();
+  if (times_ns.ndim() != 1 || T_world_rig.ndim() != 3 || T_world_rig.shape(0) != count ||
+      T_world_rig.shape(1) != 4 || T_world_rig.shape(2) != 4) {
+    throw std::invalid_argument("poses: expected times of shape (n,) and matrices (n, 4, 4)");
+  }
+  std::vector<StampedPose> poses;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const auto T = transformNear(Eigen::Map<const Matrix4>(T_world_rig.data(i, 0, 0)));
+    if (!T) throw std::invalid_argument("poses: matrix " + std::to_string(i) + " is not rigid");
+    poses.push_back({times_ns.at(i), *T});
+  }
+  writeTumTrajectory(file, poses);
+}
+
+}  // namespace
+
+void defineJobs(py::module_& module) {
+  const py::call_guard<py::gil_scoped_release> releases;
+  py::class_<StopFlag, std::shared_ptr<StopFlag>>(module, "StopFlag")
+      .def(py::init([] { return std::make_shared<StopFlag>(false); }))
+      .def("set", [](StopFlag& flag) { flag = true; });
+  py::class_<MapResult>(module, "MapResult")
+      .def_property_readonly("points", [](const MapResult& r) { return pointsOf(r.map->points); })
+      .def_property_readonly("trajectory",
+                             [](const MapResult& r) { return posesOf(r.map->trajectory); })
+      .def_property_readonly("tracker_trajectory",
+                             [](const MapResult& r) { return posesOf(r.map->tracker_trajectory); })
+      .def_property_readonly("report", [](const MapResult& r) { return reportJson(r.report); })
+      .def_property_readonly("doubts", [](const MapResult& r) { return r.report.doubts; })
+      .def(
+          "save", [](const MapResult& r, const Path& file) { savePoints(*r.map->points, file); },
+          releases)
+      .def("reject_error", &rejectError);
+  module.def("run_map", &mapRecordingInto, releases);
+  module.def("run_dsi", &mapDsi);
+  module.def("read_info", &infoOf, releases);
+  module.def("simulate", &simulateInto, releases);
+  module.def("simulation_presets", &simulationPresets);
+  module.def("true_depth", &trueDepth);
+  module.def("write_poses", &writePoses);
+  module.def("depth_errors", &depthErrorJson, releases);
+  module.def("map_errors", &cloudErrorJson, releases);
+  module.def("trajectory_errors", &trajectoryErrorJson, releases);
+}
+
+}  // namespace efm
