@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframes/fusion_mapper.h"
 
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "mapping/base/option.h"
+#include "mapping/base/thread_arena.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -61,7 +61,7 @@ int FusionMapper::addCamera(const RigCamera& camera) {
   const bool takes_part = isSelected(index, options_.cameras);
   std::vector<bool> outside_lens;
   if (takes_part) {
-    tbb::task_arena arena(options_.keyframe.sweep.threadsOrCores());
+    ThreadArena arena(options_.keyframe.sweep.threadsOrCores());
     const auto& [at, is_new] =
         arena.execute([&] { return undistortion_.emplace(index, camera.model); });
     outside_lens = at->second.outsideLens();

@@ -2,7 +2,6 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "mapping/base/option.h"
+#include "mapping/base/thread_arena.h"
 #include "mapping/events/event.h"
 
 namespace efm {
@@ -161,7 +161,7 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
   }
   if (undistortion_.size() == selected_.size()) return;
   undistortion_.clear();
-  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  ThreadArena arena(options_.sweep.threadsOrCores());
   arena.execute([&] {
     for (const int camera : selected_) undistortion_.emplace_back(cameraOf(camera).model);
   });
@@ -198,7 +198,7 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   if (!T_world_rig) return std::nullopt;
   const WindowInput input{window, cameras, view_, planes_, referencePose(*T_world_rig)};
   // 3-5. From events to depth.
-  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  ThreadArena arena(options_.sweep.threadsOrCores());
   KeyframeDepthMap keyframe =
       arena.execute([&] { return mapBest(input, trajectory, sink, stages); });
 

@@ -6,7 +6,6 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
-#include <tbb/task_arena.h>
 #include <opencv2/core.hpp>
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "mapping/base/option.h"
+#include "mapping/base/thread_arena.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
 #include "mapping/sweep/ray_bins.h"
@@ -126,7 +126,7 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& g
                                TilePeaks(planes, request.column_window, grid.view.pixels()));
   for (TilePeaks& of_dsi : peaks) of_dsi.moveTo(tile, VotingKernel::kPlain);
 
-  tbb::task_arena arena(threads);
+  ThreadArena arena(threads);
   for (int begin = 0; begin < planes; begin += threads) {
     const int count = std::min(threads, planes - begin);
     arena.execute([&] {
@@ -317,7 +317,7 @@ std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels) {
 
 SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options, const SweepRequest& request) {
-  tbb::task_arena arena(options.threadsOrCores());
+  ThreadArena arena(options.threadsOrCores());
   return arena.execute(
       [&] { return TiledSweep(std::move(cameras), grid, options, request).run(); });
 }
