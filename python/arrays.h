@@ -39,8 +39,13 @@ template <typename Matrix>
 Matrix matrixOf(const Array& array, const char* name) {
   const auto rows = Matrix::RowsAtCompileTime;
   if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != rows) {
-    throw std::invalid_argument(std::string(name) + ": expected a matrix of " +
-                                std::to_string(rows) + " x " + std::to_string(rows) + " numbers");
+    std::string shape;
+    for (py::ssize_t i = 0; i < array.ndim(); ++i) {
+      shape += (i > 0 ? " x " : "") + std::to_string(array.shape(i));
+    }
+    throw std::invalid_argument(std::string(name) + " has " + shape +
+                                " numbers: expected a matrix of " + std::to_string(rows) + " x " +
+                                std::to_string(rows));
   }
   return Eigen::Map<const Matrix>(array.data());
 }
@@ -128,9 +133,13 @@ inline void checkSignals() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
-/// Writes a map: PLY if the name says so, else PCD.
+/// Writes a map as the name of the file says.
 inline void savePoints(const MapCloud& cloud, const std::filesystem::path& file) {
-  file.extension() == ".ply" ? writePly(file, cloud) : writePcd(file, cloud);
+  const auto type = file.extension();
+  if (type != ".ply" && type != ".pcd") {
+    throw std::invalid_argument(file.string() + ": expected a name that ends with .pcd or .ply");
+  }
+  type == ".ply" ? writePly(file, cloud) : writePcd(file, cloud);
 }
 
 using OnKeyframe = std::function<void(const std::shared_ptr<const Keyframe>&)>;

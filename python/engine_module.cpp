@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // event_fusion._engine: the engine of event_fusion/engine.h for Python. The package's Python files
 // turn arguments into the types that are taken here, and document the functions.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -117,6 +119,19 @@ std::vector<StampedPose> readPoses(const RecordingSource& source) {
   return poses;
 }
 
+/// Adds poses: times (n,), and matrices (n, 4, 4) or rows (n, 7).
+void addPoses(Mapper& mapper, const py::array_t<std::int64_t>& t_ns, const Array& T_world_rig) {
+  std::vector<StampedPose> poses;
+  for (py::ssize_t i = 0; i < t_ns.size(); ++i) {
+    const std::vector<py::ssize_t> shape(T_world_rig.shape() + 1,
+                                         T_world_rig.shape() + T_world_rig.ndim());
+    const Array one(shape, T_world_rig.data() + i * T_world_rig.size() / t_ns.size(), T_world_rig);
+    poses.push_back({t_ns.at(i), rigidOf(one, "T_world_rig")});
+  }
+  const py::gil_scoped_release released;
+  for (const StampedPose& pose : poses) mapper.addPose(pose);
+}
+
 /// A mapper's own thread may wait for the interpreter's lock, so its end must not hold it.
 struct DeleteReleased {
   void operator()(Mapper* mapper) const {
@@ -129,11 +144,10 @@ using MapperPointer = std::unique_ptr<Mapper, DeleteReleased>;
 MapperPointer makeMapper(const Options& options, const OnKeyframe& on_keyframe,
                          const std::function<void(const std::string&)>& on_warning) {
   Mapper::Callbacks callbacks;
-  if (on_keyframe) {
-    callbacks.on_keyframe = [on_keyframe](const Keyframe& keyframe) {
-      give(keyframe, on_keyframe);
-    };
-  }
+  callbacks.on_keyframe = [on_keyframe](const Keyframe& keyframe) {
+    if (on_keyframe) give(keyframe, on_keyframe);
+    checkSignals();  // has no effect in the mapper's own thread
+  };
   callbacks.warn = on_warning;
   return MapperPointer(new Mapper(options, std::move(callbacks)));
 }
@@ -209,7 +223,11 @@ ValueError
                              [](const RigCamera& c) { return c.model.coefficients; })
       .def_property_readonly("T_rig_cam",
                              [](const RigCamera& c) { return arrayOf(matrixOf(c.T_rig_cam)); })
-      .def_readonly("time_offset_ns", &RigCamera::time_offset_ns);
+      .def_readonly("time_offset_ns", &RigCamera::time_offset_ns)
+      .def("__repr__", [](const RigCamera& c) {
+        return fmt::format("<Camera of {} x {} pixels, focal length {:g} px, lens {}>",
+                           c.model.width, c.model.height, c.model.fx, nameOf(c.model.distortion));
+      });
 }
 
 /// Returns the standard deviation of each depth, in metres; 0 where there is no depth.
@@ -275,7 +293,11 @@ K : numpy.ndarray, float64, shape (3, 3)
       .def_property_readonly("pose",
                              [](const Keyframe& k) { return arrayOf(matrixOf(k.T_world_ref)); })
       .def_property_readonly(
-          "K", [](const Keyframe& k) { return kOf(k.view.fx, k.view.fy, k.view.cx, k.view.cy); });
+          "K", [](const Keyframe& k) { return kOf(k.view.fx, k.view.fy, k.view.cx, k.view.cy); })
+      .def("__repr__", [](const Keyframe& k) {
+        return fmt::format("<Keyframe at {} ns: {} depths>", k.window.t_ref_ns,
+                           cv::countNonZero(k.map.depth));
+      });
 }
 
 void defineRecordings(py::module_& module) {
@@ -336,12 +358,7 @@ void defineMapper(py::module_& module) {
             mapper.addEvents(camera, std::move(events));
           },
           py::arg("camera"), py::arg("records").noconvert())  // it would convert by position
-      .def("add_pose",
-           [](Mapper& mapper, std::int64_t t_ns, const Array& T_world_rig) {
-             const StampedPose pose{t_ns, rigidOf(T_world_rig, "T_world_rig")};
-             const py::gil_scoped_release released;
-             mapper.addPose(pose);
-           })
+      .def("add_poses", &addPoses)
       .def("add_recording", &addRecording, releases)
       .def("finish", &Mapper::finish, releases)
       .def("stop", &Mapper::stop, releases)
@@ -371,6 +388,7 @@ void defineMapper(py::module_& module) {
 
 PYBIND11_MODULE(_engine, module) {
   PYBIND11_NUMPY_DTYPE(EventRecord, x, y, p, t);
+  module.attr("VERSION") = EFM_VERSION;
   module.attr("EVENT_DTYPE") = py::dtype::of<EventRecord>();
   translateErrors();
   defineCameras(module);

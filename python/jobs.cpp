@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <thread>
 
 #include "arrays.h"
 #include "mapping/base/atomic_file.h"
@@ -110,8 +111,10 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
     job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
       made = std::make_shared<const Keyframe>(keyframe);
     };
+    const auto caller = std::this_thread::get_id();
     job.on_dsi_plane = [&](int plane, int planes, const cv::Mat1f& values) {
       dsi->addPlane(plane, planes, values);
+      if (std::this_thread::get_id() == caller) checkSignals();
     };
     result = mapWindowInto(std::move(job));
     rejectError(result);

@@ -110,7 +110,7 @@ from event_fusion import plot
 
 desk = ef.open("desk")
 made = ef.map(desk)
-keyframe = made.keyframes[len(made) // 2]
+keyframe = made.keyframes[len(made.keyframes) // 2]
 figure, axes = plt.subplots(2, 3, figsize=(13, 6.5), layout="constrained")
 plot.depth(keyframe, axes[0, 0])
 plot.confidence(keyframe, axes[0, 1])

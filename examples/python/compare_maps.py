@@ -10,9 +10,11 @@ import matplotlib.pyplot as plt
 import event_fusion as ef
 from event_fusion import plot
 
+if len(sys.argv) < 3:
+    sys.exit(__doc__)
 *maps, truth = sys.argv[1:]
-figure, axes = plt.subplots(1, len(maps), sharey=True, figsize=(4 * len(maps), 3), layout="constrained")
-for path, ax in zip(maps, axes):
+figure, axes = plt.subplots(1, len(maps), sharey=True, squeeze=False, figsize=(4 * len(maps), 3), layout="constrained")
+for path, ax in zip(maps, axes[0]):
     errors = ef.evaluate.map(path, truth, align=True)
     accuracy = errors["accuracy"]
     print(f"{path}: {accuracy['points']} points, median error {100 * accuracy['median_m']:.2f} cm, "

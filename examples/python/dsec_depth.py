@@ -12,6 +12,8 @@ import numpy as np
 import event_fusion as ef
 from event_fusion import plot
 
+if len(sys.argv) < 4:
+    sys.exit(__doc__)
 sequence, poses, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 out.mkdir(parents=True, exist_ok=True)
 recording = ef.open(sequence, poses=poses)
@@ -21,4 +23,4 @@ for keyframe in made:
     axes = plot.depth(keyframe)
     axes.figure.savefig(out / f"{keyframe.t}.png", bbox_inches="tight")
     plt.close(axes.figure)
-print(len(made), "depth maps,", len(made.points), "points;", *made.doubts)
+print(made.report["keyframes"], "depth maps,", len(made.points), "points;", *made.doubts)

@@ -8,11 +8,13 @@ import numpy as np
 
 import event_fusion as ef
 
+if len(sys.argv) < 4:
+    sys.exit(__doc__)
 dsi = ef.dsi(ef.open(sys.argv[1]), sys.argv[2], sys.argv[3])
 values, depths = dsi  # (planes, rows, columns), (planes,)
 print("rays per voxel up to", values.max(), "; planes from", depths[0], "to", depths[-1], "m")
 
-# The depth of a pixel is near the plane with the most rays: the median of its neighbours is taken.
+# The depth of a pixel is near the plane with the most rays: those of its neighbours are summed.
 rows, columns = np.nonzero(dsi.keyframe.depth)
 best = np.argmax(values[:, rows, columns], axis=0)
 plane = np.interp(dsi.keyframe.depth[rows, columns], depths, np.arange(len(depths)))

@@ -9,6 +9,8 @@ import matplotlib.pyplot as plt
 
 import event_fusion as ef
 
+if len(sys.argv) < 4:
+    sys.exit(__doc__)
 recording = ef.open(sys.argv[1])
 key, values = sys.argv[2], sys.argv[3:]
 wrong, points = [], []

@@ -10,11 +10,13 @@ files: ``{"dsi.max_depth_m": 8}``. Errors of data and files are OSError, wrong a
 ('x', 'y', 'p', 't')
 """
 
-from . import evaluate
+from . import _engine, evaluate
 from ._engine import EVENT_DTYPE, Camera, Keyframe, simulation_presets
 from ._events import EventFusionWarning, events
 from ._mapping import Dsi, Map, Mapper, dsi, map
 from ._recording import Recording, open, simulate
+
+__version__ = _engine.VERSION
 
 __all__ = [
     "EVENT_DTYPE",

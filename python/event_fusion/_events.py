@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import operator
 import os
+from collections.abc import Mapping as MappingType
 from decimal import Decimal, InvalidOperation
 from typing import Any, Callable, Mapping, Union
 
@@ -34,7 +36,17 @@ def _ns_per(time_unit: str) -> int:
     return _NS_PER[time_unit]
 
 
+def whole(name: str, value: Any, what: str = "a whole number") -> int:
+    """Return an argument as an int; other types are an error that names it."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} = {value!r}: expected {what}, as an int") from None
+
+
 def _pixels(name: str, column: Array) -> Array:
+    if column.dtype.kind not in "biuf":
+        raise TypeError(f"{name}: {column.dtype}: expected whole numbers")
     if column.dtype.kind in "ub" and column.dtype.itemsize <= 2:
         return column
     fits = (column >= 0) & (column <= 65535)
@@ -84,16 +96,27 @@ def events(x: npt.ArrayLike, y: npt.ArrayLike, p: npt.ArrayLike, t: npt.ArrayLik
     made["x"] = _pixels("x", columns[0])
     made["y"] = _pixels("y", columns[1])
     made["p"] = columns[2] > 0
-    times = columns[3]
-    if times.dtype.kind == "f":
-        if not np.all(np.isfinite(times)):
-            raise ValueError("t: expected finite times")
-        made["t"] = np.rint(times * factor)
-    else:
-        made["t"] = times
-        if factor != 1:
-            made["t"] *= factor
+    made["t"] = _times_in_ns(columns[3], factor)
     return made
+
+
+def _times_in_ns(times: Array, factor: int) -> Array:
+    def reject(wrong: Array, expected: str) -> None:
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise ValueError(f"t[{at}] = {times[at]}: expected {expected}")
+
+    if times.dtype.kind not in "iuf":
+        raise TypeError(f"t: {times.dtype}: expected numbers")
+    largest = (2**63 - 1) // factor
+    with np.errstate(invalid="ignore"):
+        reject(~(np.abs(times.astype(float)) < largest), f"a finite time below {largest:.2g} of its unit")
+        if times.dtype.kind == "f" and factor == 1:
+            reject(times != np.floor(times), "whole nanoseconds; of seconds: time_unit='s'")
+    if times.dtype.kind == "f":
+        times, factor = np.rint(times * factor), 1
+    ns: Array = times.astype(np.int64, copy=False)
+    return ns if factor == 1 else ns * factor
 
 
 def event_records(array: npt.ArrayLike, time_unit: str = "ns") -> Array:
@@ -105,6 +128,8 @@ def event_records(array: npt.ArrayLike, time_unit: str = "ns") -> Array:
     if time_unit == "ns" and records.dtype == EVENT_DTYPE:
         return np.ascontiguousarray(records)
     names = records.dtype.names or ()
+    if names and records.ndim != 1:
+        raise ValueError(f"events of shape {records.shape}: expected one dimension")
     time = next((name for name in _TIMES if name in names), None)
     polarity = next((name for name in _POLARITIES if name in names), None)
     if time is None or polarity is None or "x" not in names or "y" not in names:
@@ -134,6 +159,8 @@ def nanoseconds(name: str, time: int | str | None, start: Callable[[], int | Non
     if time is None or isinstance(time, (int, np.integer)):
         return None if time is None else int(time)
     try:
+        if not isinstance(time, str):
+            raise ValueError
         ns = int((Decimal(time) * 10**9).to_integral_value())
     except (InvalidOperation, TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {time!r}: expected nanoseconds (int), or seconds as a str: '3.2', '+3.2'") from None
@@ -150,6 +177,8 @@ def engine_options(options: Options | None) -> _engine.Options:
     made = _engine.Options()
     if isinstance(options, (str, os.PathLike)):
         made.read(os.fspath(options))
+    elif options is not None and not isinstance(options, MappingType):
+        raise TypeError(f"options = {options!r}: expected {{'section.key': value, …}}, or the path of an .ini file")
     else:
         for key, value in (options or {}).items():
             if isinstance(value, (bool, np.bool_)):

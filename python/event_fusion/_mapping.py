@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import sys
 import threading
 import warnings as python_warnings
 import weakref
@@ -27,13 +28,22 @@ from ._events import (
     engine_options,
     event_records,
     nanoseconds,
+    whole,
 )
-from ._recording import Recording
+from ._recording import Recording, open
 
 
 def _warn(found: list[tuple[str, str]]) -> None:
+    """Give Python's warnings, at the line outside of the package that waits for the result."""
+    depth, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+        depth, frame = depth + 1, frame.f_back
     for name, text in found:
-        python_warnings.warn(f"{name}: {text}", EventFusionWarning, stacklevel=4)
+        python_warnings.warn(f"{name}: {text}", EventFusionWarning, stacklevel=depth)
+
+
+def _opened(recording: Recording | Path) -> Recording:
+    return recording if isinstance(recording, Recording) else open(recording)
 
 
 class Mapper:
@@ -118,11 +128,28 @@ class Mapper:
         ValueError
             If the pose is not finite or not rigid, or a second older than the newest one.
         """
-        self._mapper.add_pose(t, T_world_rig)
+        self.add_poses([whole("t", t, "nanoseconds")], np.asarray(T_world_rig, float)[None])
 
-    def add_recording(self, recording: Recording) -> None:
-        """Add the events and poses of a recording, in the order of time; Ctrl-C ends it."""
-        self._mapper.add_recording(recording._source)
+    def add_poses(self, t: npt.ArrayLike, T_world_rig: npt.ArrayLike) -> None:
+        """Add poses in the order of time: times (n,) in nanoseconds, and matrices (n, 4, 4) or rows (n, 7)."""
+        times, poses = np.asarray(t), np.asarray(T_world_rig, float)
+        if times.dtype.kind not in "iu" or times.ndim != 1:
+            raise TypeError(f"t: {times.dtype} of shape {times.shape}: expected nanoseconds, as ints")
+        if poses.shape not in ((len(times), 4, 4), (len(times), 7)):
+            shape = poses.shape[1:]
+            raise ValueError(
+                f"T_world_rig of shape {shape if len(times) == len(poses) else poses.shape}: expected (4, 4), or (7,): "
+                "tx ty tz qx qy qz qw; of each time"
+            )
+        finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
+        if not finite.all():
+            wrong = int(np.argmin(finite))
+            raise ValueError(f"T_world_rig at {times[wrong]} ns: expected finite numbers: {poses[wrong].tolist()}")
+        self._mapper.add_poses(times, poses)
+
+    def add_recording(self, recording: Recording | Path) -> None:
+        """Add the events and poses of a recording, in the order of time."""
+        self._mapper.add_recording(_opened(recording)._source)
 
     def finish(self) -> None:
         """End the input, and map the rest. The warnings are Python's `EventFusionWarning`, too."""
@@ -134,8 +161,11 @@ class Mapper:
         self._mapper.stop()
 
     def save(self, path: Path) -> None:
-        """Write the points as PLY, if the name ends so, else as PCD."""
+        """Write the points as .ply or .pcd."""
         self._mapper.save(os.fspath(path))
+
+    def __repr__(self) -> str:
+        return f"<Mapper: {self.status['keyframes']} keyframes>"
 
     @property
     def points(self) -> Array:
@@ -181,12 +211,12 @@ class Map:
     """The map of a recording: see `map`. Keyframes come while the recording is mapped.
 
     A loop over the map, or `keyframes`, gives them in the order of time; `points`, `trajectory`, `report` and
-    `warnings` wait for the end. ``len`` is the number of keyframes.
+    `warnings` wait for the end. After Ctrl-C or `close`, they are those of the recording so far.
     """
 
     def __init__(
         self,
-        recording: Recording,
+        recording: Recording | Path,
         options: Options | None,
         out: Path | None,
         force: bool,
@@ -194,12 +224,15 @@ class Map:
         progress: Progress,
     ) -> None:
         checked = engine_options(options)
+        recording = _opened(recording)
         self._keep = keep
+        self._count = 0
+        self._looped = False
         self._made: list[Keyframe] = []
         self._result: _engine.MapResult | None = None
         self._error: BaseException | None = None
         self._bar = ProgressBar(progress)
-        stop = _engine.StopFlag()
+        stop = self._stop = _engine.StopFlag()
         # With `keep`, the mapping need not wait for the loop.
         items: queue.Queue[Any] = queue.Queue(0 if keep else 2)
         on_progress = self._bar if self._bar.used else None
@@ -223,11 +256,11 @@ class Map:
             raise self._error
         try:
             item = self._items.get()
-        except BaseException as error:  # Ctrl-C
-            self._error = error
+        except BaseException:  # Ctrl-C
             self.close()
             raise
         if isinstance(item, Keyframe):
+            self._count += 1
             if self._keep:
                 self._made.append(item)
             return item
@@ -248,6 +281,9 @@ class Map:
 
     def __iter__(self) -> Iterator[Keyframe]:
         if not self._keep:
+            if self._looped:
+                raise RuntimeError("keep=False: a loop over the map gives each keyframe once")
+            self._looped = True
             while (keyframe := self._next()) is not None:
                 yield keyframe
             return
@@ -256,19 +292,17 @@ class Map:
             yield self._made[at]
             at += 1
 
-    def __len__(self) -> int:
-        return len(self._finished().trajectory[0])
-
     def __repr__(self) -> str:
-        state = "made" if self._result is not None else "ended" if self._error is not None else "being made"
-        return f"<Map of {self._recording!r}: {state}, {len(self._made)} keyframes kept>"
+        state = "made" if self._result is not None else "failed" if self._error is not None else "being made"
+        return f"<Map of {', '.join(self._recording.files)}: {state}, {self._count} keyframes so far>"
 
     def close(self) -> None:
-        """End the mapping, if it goes on. A folder has the map so far."""
-        self._close()
-        self._bar.close()
-        if self._result is None and self._error is None:
-            self._error = RuntimeError("the map was closed before its end")
+        """End the mapping, if it goes on, after the current keyframe: the map is that of the recording so far."""
+        self._stop.set()
+        try:
+            self._finished()
+        except (OSError, ValueError) as error:
+            self._error = error
 
     @property
     def keyframes(self) -> list[Keyframe]:
@@ -310,12 +344,12 @@ class Map:
         return self._finished().doubts
 
     def save(self, path: Path) -> None:
-        """Write the points as PLY, if the name ends so, else as PCD."""
+        """Write the points as .ply or .pcd."""
         self._finished().save(os.fspath(path))
 
 
 def map(
-    recording: Recording,
+    recording: Recording | Path,
     options: Options | None = None,
     out: Path | None = None,
     *,
@@ -327,7 +361,7 @@ def map(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
         See `open`.
     options : mapping of str to str, number or bool; or path
         Keys of the .ini files, or such a file, or the name of an installed one. What is not given has its default.
@@ -367,10 +401,14 @@ class Dsi(tuple):  # type: ignore[type-arg]
     depths : numpy.ndarray, float64, shape (planes,)
         Metres along z of the view, nearest first.
     keyframe : Keyframe
-        The view, as `Keyframe.pose` and `Keyframe.K`, and the depth map of the DSI.
+        The view, as `Keyframe.pose` and `Keyframe.K`, and the depth map of the DSI. A depth is not at the largest value
+        of its own pixel: the values of neighbouring pixels are summed first (``depth.extraction``: aggregated).
     """
 
     keyframe: Keyframe
+
+    def __repr__(self) -> str:
+        return f"<Dsi of shape {self.values.shape}, {self.depths[0]:.3g} to {self.depths[-1]:.3g} m>"
 
     @property
     def values(self) -> Array:  # noqa: D102
@@ -384,7 +422,7 @@ class Dsi(tuple):  # type: ignore[type-arg]
 
 
 def dsi(
-    recording: Recording,
+    recording: Recording | Path,
     t0: int | str,
     t1: int | str,
     options: Options | None = None,
@@ -396,7 +434,7 @@ def dsi(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
         See `open`.
     t0, t1 : int or str
         The window [t0, t1): nanoseconds, or text as in `open`.
@@ -415,8 +453,10 @@ def dsi(
         If the recording cannot be read, or the window has no keyframe.
     """
 
+    source = _opened(recording)._source
+
     def start() -> int | None:
-        return _engine.first_event(recording._source)
+        return _engine.first_event(source)
 
     t0_ns, t1_ns, t_ref_ns = (
         nanoseconds(name, time, start) for name, time in (("t0", t0), ("t1", t1), ("t_ref", t_ref))
@@ -425,7 +465,7 @@ def dsi(
     bar = ProgressBar(progress)
     try:
         values, depths, keyframe = _engine.run_dsi(
-            recording._source, checked, t0_ns, t1_ns, t_ref_ns, bar if bar.used else None
+            source, checked, t0_ns, t1_ns, t_ref_ns, bar if bar.used else None
         )
     finally:
         bar.close()

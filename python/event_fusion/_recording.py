@@ -12,7 +12,7 @@ from typing import Any, Iterator, Sequence
 
 from . import _engine
 from ._engine import Camera
-from ._events import Array, Path, Progress, ProgressBar, in_unit, nanoseconds, _ns_per
+from ._events import Array, Path, Progress, ProgressBar, in_unit, nanoseconds, whole, _ns_per
 
 
 class Recording:
@@ -60,7 +60,7 @@ class Recording:
         """
         if not 0 <= camera < len(self.rig):
             raise ValueError(f"camera = {camera}: expected a camera of the recording: 0 to {len(self.rig) - 1}")
-        if chunk < 1:
+        if whole("chunk", chunk) < 1:
             raise ValueError(f"chunk = {chunk}: expected 1 or above")
         _ns_per(time_unit)
         return self._read(camera, chunk, time_unit)
@@ -74,7 +74,8 @@ class Recording:
     def poses(self) -> tuple[Array, Array]:
         """Poses of the rig: times (n,), int64, nanoseconds, and T_world_rig (n, 4, 4), float64.
 
-        Read once, at the first use: this reads the whole recording. Without poses both are empty.
+        Times are rounded to 100 ns, as the maps use them. Read once, at the first use: this reads the whole recording.
+        Without poses both are empty.
         """
         return _engine.read_poses(self._source)
 

@@ -97,13 +97,17 @@ def depth(
     Returns
     -------
     dict
-        maps (a dict each), mean, all, and precision and recall over the thresholds.
+        maps (a dict each), mean and all: points, mean_abs_m, median_abs_m, beyond_tenth (fraction of the depths that
+        are wrong by more than a tenth), bad_pix_3px, …; curve: threshold_m, precision, recall, f1; without_truth,
+        without_estimate (numbers of maps).
 
     Raises
     ------
     OSError, ValueError
         If a file cannot be read; if sizes differ; if nothing can be compared.
     """
+    if isinstance(estimate, np.ndarray) and isinstance(truth, np.ndarray) and estimate.shape != truth.shape:
+        raise ValueError(f"an estimate of shape {estimate.shape} and a truth of shape {truth.shape}: expected one shape")
     with tempfile.TemporaryDirectory() as folder:
         estimated = _depth_file(estimate, pathlib.Path(folder, "estimate"))
         true = _depth_file(truth, pathlib.Path(folder, "truth"))
@@ -159,7 +163,8 @@ def map(
     Returns
     -------
     dict
-        accuracy and completeness_distance (points, mean_m, median_m, …) and the curve over the distances.
+        accuracy and completeness_distance (points, mean_m, median_m, rms_m, p90_m, max_m) and the curve: distance_m,
+        within, outliers, completeness, f1.
 
     Raises
     ------

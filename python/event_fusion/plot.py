@@ -2,7 +2,9 @@
 """Figures of depth maps, maps and errors with matplotlib, in the colours of the program's pictures.
 
 Each function draws into `ax`, or into a new figure, and returns its Axes: ``plot.depth(k).figure.savefig("depth.pdf")``.
-Lines and text of a PDF or SVG are vectors; pixels and points of clouds are embedded as images.
+Lines and text of a PDF or SVG are vectors; pixels and points of clouds are embedded as images. Own figures:
+``plt.subplots(layout="constrained")`` leaves room for the labels; ``plt.rcParams["pdf.fonttype"] = 42`` embeds the fonts
+that publishers ask for.
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ _BLUE, _ORANGE, _GREEN = "#1f77b4", "#d95f02", "#1b9e77"
 _DOTS_PER_INCH = 300  # of embedded images
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def _palette(name: str, begin: float, end: float) -> Colormap:
     colours = matplotlib.colormaps[name](np.linspace(begin, end, 256))
     return ListedColormap(colours, name=f"event_fusion_{name}")
@@ -45,33 +51,34 @@ def _axes(ax: Axes | None) -> Axes:
     return pyplot.subplots(layout="constrained", dpi=_DOTS_PER_INCH / 2)[1] if ax is None else ax
 
 
-def _image(ax: Axes, values: Array, label: str, ticks: Sequence[float] | None = None, **style: Any) -> Axes:
+def _image(
+    ax: Axes, values: Array, label: str, ticks: Sequence[float] | None = None, extend: str = "neither", **style: Any
+) -> Axes:
     """Draw an image with pixel (0, 0) at the top left, and its colour bar."""
+    if not np.isfinite(values).any():
+        ax.text(0.5, 0.5, "no depth", transform=ax.transAxes, ha="center", va="center")
     drawn = ax.imshow(values, interpolation="nearest", **style)
     ax.set_xticks([])
     ax.set_yticks([])
-    bar = ax.figure.colorbar(drawn, ax=ax, label=label, fraction=0.04, pad=0.02)
+    bar = ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.035, 1]), label=label, extend=extend)
     if ticks is not None:
         bar.set_ticks(ticks)
-        bar.set_ticklabels([f"{tick:g}" for tick in ticks])
+        bar.set_ticklabels([f"{tick:.2g}" for tick in ticks])
         bar.ax.minorticks_off()
     return ax
 
 
 def _depths(value: Union[Keyframe, Array]) -> Array:
+    if not isinstance(value, (Keyframe, np.ndarray)):
+        raise TypeError(f"{value!r}: expected a keyframe, such as map.keyframes[0], or an array of rows and columns")
     image = np.asarray(value.depth if isinstance(value, Keyframe) else value, float)
     return np.where(np.isfinite(image) & (image > 0), image, np.nan)
 
 
-def _round_depths(near: float, far: float) -> list[float]:
-    """Return a few round depths whose inverses are spread over the range."""
-    found: list[float] = []
-    for inverse in np.linspace(1 / near, 1 / far, 6):
-        digits = 1 - int(np.floor(np.log10(1 / inverse)))
-        depth_m = float(np.round(1 / inverse, digits))
-        if near <= depth_m <= far and depth_m not in found:
-            found.append(depth_m)
-    return found
+def _title(ax: Axes, value: Any) -> None:
+    """Name a keyframe by its time."""
+    if isinstance(value, Keyframe):
+        ax.set_title(f"{value.t / 1e9:.3f} s", fontsize="medium")
 
 
 def depth(
@@ -86,7 +93,12 @@ def depth(
     ax : matplotlib.axes.Axes
         By default of a new figure.
     limits : (float, float)
-        Near and far end of the colours; by default the depths' 1 % and 99 %.
+        Near and far end of the colours; by default the depths' 1 % and 99 %. The same limits make figures comparable.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is neither a keyframe nor an array, or the limits are not 0 < near < far.
     """
     ax = _axes(ax)
     metres = _depths(keyframe)
@@ -94,17 +106,23 @@ def depth(
         valid = metres[np.isfinite(metres)]
         near, far = np.percentile(valid, [1, 99]) if valid.size else (1.0, 2.0)
         limits = float(near), float(max(far, 1.001 * near))
+    if not 0 < limits[0] < limits[1]:
+        raise ValueError(f"limits = {limits}: expected 0 < near < far, metres")
+    _title(ax, keyframe)
     if isinstance(keyframe, Keyframe):
         grey = np.sqrt(np.maximum(keyframe.confidence, 0))
         ax.imshow(grey, cmap="Greys", vmin=0, vmax=4.25 * max(float(grey.max()), 1e-9), interpolation="nearest")
     norm = FuncNorm((lambda z: -1 / np.maximum(z, 1e-9), lambda i: -1 / np.minimum(i, -1e-9)), *limits)
-    return _image(ax, metres, "depth [m]", _round_depths(*limits), cmap=_DEPTH, norm=norm)
+    ticks = 1 / np.linspace(1 / limits[0], 1 / limits[1], 6)
+    return _image(ax, metres, "depth [m]", list(ticks), cmap=_DEPTH, norm=norm)
 
 
 def confidence(keyframe: Union[Keyframe, Array], ax: Axes | None = None) -> Axes:
     """Draw the confidence (ray density) of each pixel: white is 0, black the largest."""
     values = keyframe.confidence if isinstance(keyframe, Keyframe) else np.asarray(keyframe)
-    return _image(_axes(ax), values, "confidence", cmap="Greys", vmin=0)
+    ax = _axes(ax)
+    _title(ax, keyframe)
+    return _image(ax, values, "confidence", cmap="Greys", vmin=0)
 
 
 def error(
@@ -149,7 +167,9 @@ def error(
         near = np.where(nearer | np.isnan(near), shifted, near)
     percent = 100 * (metres - near) / near
     end = 100 * largest
-    return _image(_axes(ax), percent, "depth error [%]", cmap=_ERROR, vmin=-end, vmax=end)
+    ax = _axes(ax)
+    _title(ax, keyframe)
+    return _image(ax, percent, "depth error [%]", extend="both", cmap=_ERROR, vmin=-end, vmax=end)
 
 
 def precision_recall(errors: dict[str, Any], ax: Axes | None = None) -> Axes:
@@ -207,8 +227,8 @@ def trajectory(*paths: Any, labels: Sequence[str] = (), ax: Axes | None = None) 
     ax : matplotlib.axes.Axes
         By default of a new figure.
     """
-    if not paths:
-        raise ValueError("trajectory: expected a path")
+    if not paths or (labels and len(labels) != len(paths)):
+        raise ValueError(f"{len(paths)} paths and {len(labels)} labels: expected a path, and a label for each or none")
     ax = _axes(ax)
     all_positions = [_positions(path) for path in paths]
     first, second = _plane_of(all_positions[0])
@@ -224,10 +244,21 @@ def trajectory(*paths: Any, labels: Sequence[str] = (), ax: Axes | None = None) 
     return ax
 
 
+def _direction(direction: Array) -> str:
+    """Name a direction of the world: the axis that it is, or is near."""
+    axis = int(np.argmax(np.abs(direction)))
+    exact = abs(direction[axis]) > 0.999
+    return f"{'' if exact else 'about '}{'-' if direction[axis] < 0 else ''}{'xyz'[axis]}"
+
+
 def map(  # noqa: A001
-    points: Union[Map, Mapper, Array], ax: Axes | None = None, *, up: Sequence[float] | None = None, size: float = 1.0
+    points: Union[Map, Mapper, Array],
+    ax: Axes | None = None,
+    *,
+    up: Sequence[float] | None = None,
+    size: float | None = None,
 ) -> Axes:
-    """Draw a point cloud from above, coloured by height.
+    """Draw a point cloud from above, coloured by height; of a map, the path of its keyframes, too.
 
     Parameters
     ----------
@@ -238,15 +269,22 @@ def map(  # noqa: A001
     up : sequence of 3 float
         The upward direction of the world. By default that of the keyframes' images of a map, and z for arrays.
     size : float
-        Size of a point in typographic points.
+        Area of a point in square typographic points; by default by the number of points.
     """
+    path = None
+    if isinstance(points, (Map, Mapper)):
+        path = points.trajectory[1][:, :3, 3]
     if up is None:
         up = -np.mean(points.trajectory[1][:, :3, 1], axis=0) if isinstance(points, (Map, Mapper)) else (0, 0, 1)
     cloud = points.points if isinstance(points, (Map, Mapper)) else np.asarray(points)
+    if cloud.dtype.names is None and (cloud.ndim != 2 or cloud.shape[1] != 3):
+        raise ValueError(f"points of shape {cloud.shape}: expected a map, (n, 3), or the fields x, y, z")
     if cloud.dtype.names is not None:
         cloud = np.stack([cloud[axis] for axis in "xyz"], axis=1)
     ax = _axes(ax)
     upward = np.asarray(up, float)
+    if upward.shape != (3,) or not np.linalg.norm(upward) > 0:
+        raise ValueError(f"up = {up}: expected three numbers, not all 0")
     upward = upward / np.linalg.norm(upward)
     # The axis of the world that is nearest to the right stays to the right.
     right = np.eye(3)[int(np.argmin(np.abs(upward[:2])))]
@@ -255,15 +293,12 @@ def map(  # noqa: A001
     across = np.cross(upward, right)
     height = cloud @ upward
     order = np.argsort(height)
-    if len(cloud):
-        lowest, highest = np.percentile(height, [1, 99])
-    else:
-        lowest, highest = 0.0, 1.0
+    lowest, highest = np.percentile(height, [1, 99]) if len(cloud) else (0.0, 1.0)
     drawn = ax.scatter(
         (cloud @ right)[order],
         (cloud @ across)[order],
         c=height[order],
-        s=size,
+        s=np.clip(4e4 / max(len(cloud), 1), 1, 12) if size is None else size,
         marker=".",
         linewidths=0,
         cmap=_HEIGHT,
@@ -271,8 +306,23 @@ def map(  # noqa: A001
         vmax=highest,
         rasterized=True,
     )
-    ax.figure.colorbar(drawn, ax=ax, label="height [m]", fraction=0.04, pad=0.02)
-    ax.set(xlabel="[m]", ylabel="[m]")
+    ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.035, 1]), label="height [m]")
+    if path is not None:
+        ax.plot(path @ right, path @ across, "-", color="black", linewidth=1, label="keyframes")
+        ax.plot(path[:1] @ right, path[:1] @ across, "o", color="black", markersize=3)
+        ax.legend(frameon=False, fontsize="small")
+    if len(cloud):  # a few far points do not set the limits
+        for axis, values in (("x", cloud @ right), ("y", cloud @ across)):
+            shown = np.percentile(values, [0.5, 99.5])
+            if path is not None:
+                along = path @ (right if axis == "x" else across)
+                shown = min(shown[0], along.min()), max(shown[1], along.max())
+            margin = 0.05 * (shown[1] - shown[0]) + 1e-3
+            ax.set(**{f"{axis}lim": (shown[0] - margin, shown[1] + margin)})
+    else:
+        ax.text(0.5, 0.5, "no points", transform=ax.transAxes, ha="center", va="center")
+    names = [_direction(direction) for direction in (right, across)]
+    ax.set(xlabel=f"{names[0]} [m]", ylabel=f"{names[1]} [m]")
     ax.set_aspect("equal", adjustable="datalim")
     ax.grid(alpha=0.3)
     return ax

@@ -23,7 +23,8 @@ import event_fusion as ef
 
 program, path = sys.argv[1], sys.argv[2]
 large = int(float(sys.argv[3])) if len(sys.argv) > 3 else 20_000_000
-OPTIONS = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 6.5, "keyframes.window_s": 0.5, "keyframes.stride_s": 0.5}
+OPTIONS = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 6.5, "dsi.num_planes": 100,
+           "keyframes.window_s": 0.5, "keyframes.stride_s": 0.5}
 
 
 def memory_mb():
@@ -40,8 +41,7 @@ def map_arrays(rig, events, poses, options):
     mapper = ef.Mapper(options)
     for camera in rig:
         mapper.add_camera(camera)
-    for t, T in zip(*poses):
-        mapper.add_pose(int(t), T)
+    mapper.add_poses(*poses)
     for camera, part in enumerate(events):
         mapper.add_events(camera, part)
     mapper.finish()
@@ -90,7 +90,7 @@ def leak():
         for i in range(1001):
             recording = ef.open(folder + "/slider")
             made = ef.map(recording, {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "keyframes.window_s": 0.04})
-            assert len(made) > 0 and sum(len(part) for part in recording.events()) > 0
+            assert len(made.keyframes) > 0 and sum(len(part) for part in recording.events()) > 0
             if i % 200 == 0:
                 used.append(round(memory_mb()))
         print("memory after 0, 200, … 1000 opens and maps:", *used, "MB")
