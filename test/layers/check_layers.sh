@@ -54,6 +54,11 @@ forbid plugin "$recordings" "HDF5 stays in plugin/recordings/columns/ and writer
 
 forbid include "$mrpt|$ceres|$recordings|$front|pcl/|tbb|nlohmann|fmt/" "the public header: Eigen, OpenCV, PCL by map_point.h"
 forbid plugin "$mrpt" "MRPT stays in mrpt/" '^plugin/mrpt/'
+forbid python "(test|plugin/app|plugin/mrpt)/" "a thin face: the engine alone"
+forbid python "$mrpt|$pcl|$ceres|$recordings|$front|nlohmann|tbb" "may use pybind11 and what the engine's headers use"
+for folder in mapping maps tracking_stub plugin include; do
+  forbid "$folder" "pybind11" "pybind11 stays in python/"
+done
 
 # Every folder is in the table, and includes only the folders that the table allows it.
 folders=$(awk '
