@@ -232,9 +232,9 @@ def test_two_mappers_run_in_two_threads(desk, by_program):
     assert len(made) == 2
 
 
-def test_the_map_is_that_of_the_program_with_options_from_the_data_and_its_folder_too(desk, tmp_path):
-    program("map", DESK, "-q", "--out", tmp_path / "program")
-    made = ef.map(desk, out=tmp_path / "python")
+def test_the_map_is_that_of_the_program_with_options_from_the_data_and_its_folder_too(tmp_path):
+    program("map", DESK, "-q", "--t1", "+0.6", "--out", tmp_path / "program")
+    made = ef.map(ef.open(DESK, t1="+0.6"), out=tmp_path / "python")
     points = points_of(tmp_path / "program" / "map.pcd")
     for name in points.dtype.names:
         np.testing.assert_array_equal(made.points[name], points[name], name)
@@ -366,22 +366,22 @@ def test_the_info_is_that_of_the_program(desk):
 
 
 def test_errors_are_those_of_the_program(made, desk, folder, tmp_path):
-    assert ef.evaluate.depth(folder, DESK) == json.loads(program("evaluate", "depth", folder, DESK, "--json"))
-    assert ef.evaluate.map(folder, DESK) == json.loads(program("evaluate", "map", folder, DESK, "--json"))
+    of_depth, of_map = ef.evaluate.depth(folder, DESK), ef.evaluate.map(folder, DESK)
+    assert of_depth == json.loads(program("evaluate", "depth", folder, DESK, "--json"))
+    assert of_map == json.loads(program("evaluate", "map", folder, DESK, "--json"))
     of_path = ef.evaluate.trajectory(folder, DESK)
     assert of_path == json.loads(program("evaluate", "trajectory", folder, DESK, "--json"))
     # From memory: the same numbers, but for the names, and float32 in the PCD file.
-    for errors in (ef.evaluate.depth(made, desk), ef.evaluate.depth(iter(made), desk)):
-        assert errors["all"] == ef.evaluate.depth(folder, DESK)["all"]
-    for points in (made, made.points, np.stack([made.points[axis] for axis in "xyz"], 1)):
-        assert ef.evaluate.map(points, desk)["accuracy"] == ef.evaluate.map(folder, DESK)["accuracy"]
+    assert ef.evaluate.depth(iter(made), desk)["all"] == of_depth["all"]
+    for points in (made, np.stack([made.points[axis] for axis in "xyz"], 1)):
+        assert ef.evaluate.map(points, desk)["accuracy"] == of_map["accuracy"]
     assert ef.evaluate.trajectory(made, desk)["pairs"] == of_path["pairs"]
     keyframe = made.keyframes[0]
     truth = ef.evaluate.true_depth(desk, keyframe.t)
     np.save(tmp_path / "truth.npy", truth)
     one = ef.evaluate.depth(keyframe.depth, truth)["all"]
     assert one == ef.evaluate.depth(keyframe.depth, tmp_path / "truth.npy")["all"]
-    assert one["points"] == ef.evaluate.depth(folder, DESK)["maps"][0]["points"]
+    assert one["points"] == of_depth["maps"][0]["points"]
 
 
 def test_a_simulation_is_that_of_the_program(tmp_path):
@@ -459,7 +459,7 @@ def test_types_are_right(tmp_path):
     assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
-def test_the_examples_run(desk, folder, tmp_path):
+def test_the_examples_run(tmp_path):
     def example(name, *arguments):
         words = [sys.executable, os.path.join(SOURCE, "examples", "python", name), *map(str, arguments)]
         environment = {**os.environ, "MPLBACKEND": "agg"}
@@ -471,7 +471,7 @@ def test_the_examples_run(desk, folder, tmp_path):
     assert "depth maps" in example("dsec_depth.py", part, "", "depths")
     assert "pixels have a depth" in example("dsi_to_numpy.py", part, "+0.1", "+0.3")
     assert example("option_study.py", part, "fusion.across_cameras", "min", "harmonic").count("wrong by") == 2
-    assert example("compare_maps.py", folder, "own.pcd", DESK).count("median error") == 2
+    assert example("compare_maps.py", "own.pcd", "own.pcd", DESK).count("median error") == 2
     keyframes = {os.path.splitext(file)[0] for file in os.listdir(tmp_path / "depths")}
     assert len(keyframes) > 0
     for file in ("own.pcd", "dsi.npz", "study.pdf", "compared.pdf", *(f"depths/{t}.npy" for t in keyframes)):
