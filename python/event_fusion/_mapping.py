@@ -197,14 +197,22 @@ def _run(items: queue.Queue[Any], job: Callable[[Callable[[Keyframe], None]], _e
         items.put(error)
 
 
-def _end(stop: _engine.StopFlag, items: queue.Queue[Any], thread: threading.Thread) -> None:
-    """End a mapping whose result nobody waits for."""
-    stop.set()
-    while thread.is_alive() and thread is not threading.current_thread():
+def _end(stop: _engine.StopFlag, items: queue.Queue[Any], thread: threading.Thread, has_folder: bool) -> None:
+    """End a mapping whose result nobody waits for. One with a folder goes on to its end; its errors are warnings."""
+    if not has_folder:
+        stop.set()
+    while thread is not threading.current_thread() and (thread.is_alive() or not items.empty()):
         try:
-            items.get(timeout=0.02)
+            item = items.get(timeout=0.02)
+            if isinstance(item, BaseException):
+                raise item
+            if isinstance(item, _engine.MapResult):
+                item.reject_error()
         except queue.Empty:
             pass
+        except Exception as error:
+            if has_folder:
+                python_warnings.warn(f"a map that nobody looked at failed: {error}", EventFusionWarning, stacklevel=2)
 
 
 class Map:
@@ -245,7 +253,7 @@ class Map:
         self._recording = recording  # a simulated one is removed with its last user
         self._items = items
         self._thread = threading.Thread(target=_run, args=(items, job), daemon=True, name="event_fusion.map")
-        self._close = weakref.finalize(self, _end, stop, items, self._thread)
+        weakref.finalize(self, _end, stop, items, self._thread, out is not None)
         self._thread.start()
 
     def _next(self) -> Keyframe | None:
@@ -269,8 +277,10 @@ class Map:
             self._error = item
             raise item
         self._result = item
-        _warn(self.warnings)
-        item.reject_error()
+        try:
+            _warn(self.warnings)
+        finally:
+            item.reject_error()
         return None
 
     def _finished(self) -> _engine.MapResult:
@@ -366,7 +376,8 @@ def map(
     options : mapping of str to str, number or bool; or path
         Keys of the .ini files, or such a file, or the name of an installed one. What is not given has its default.
     out : path
-        A folder for all that the program writes: map.pcd, map.html, pictures, report.json. By default no file.
+        A folder for all that the program writes: map.pcd, map.html, pictures, report.json. By default no file. The
+        folder is made also if nothing uses the result.
     force : bool
         Allow a folder that holds other files.
     keep : bool

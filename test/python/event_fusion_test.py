@@ -280,6 +280,13 @@ def test_a_map_that_nobody_waits_for_ends(desk):
     assert threading.active_count() == before
 
 
+def test_a_folder_is_made_also_if_nobody_looks_at_the_map(tmp_path):
+    ef.map(ef.open(DESK, t1="+0.6"), OPTIONS, tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["keyframes"] > 0
+    with pytest.warns(ef.EventFusionWarning, match="nobody looked at failed: .*holds other files"):
+        ef.map(DESK, OPTIONS, os.path.dirname(__file__))
+
+
 def test_ctrl_c_ends_a_map(tmp_path):
     script = tmp_path / "wait.py"
     script.write_text(
