@@ -127,6 +127,24 @@ inline py::tuple posesOf(const std::vector<StampedPose>& poses) {
   return py::make_tuple(times, matrices);
 }
 
+/// Returns the poses of times (n,) in nanoseconds, and matrices (n, 4, 4) or rows (n, 7).
+inline std::vector<StampedPose> stampedPoses(const py::array_t<std::int64_t>& t_ns,
+                                             const Array& T_world_rig) {
+  const py::ssize_t count = t_ns.size();
+  if (t_ns.ndim() != 1 || T_world_rig.ndim() < 2 || T_world_rig.shape(0) != count) {
+    throw std::invalid_argument(
+        "poses: expected times of shape (n,), and matrices (n, 4, 4) or rows (n, 7)");
+  }
+  const std::vector<py::ssize_t> shape(T_world_rig.shape() + 1,
+                                       T_world_rig.shape() + T_world_rig.ndim());
+  std::vector<StampedPose> poses;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const Array one(shape, T_world_rig.data() + i * T_world_rig.size() / count, T_world_rig);
+    poses.push_back({t_ns.at(i), rigidOf(one, "T_world_rig")});
+  }
+  return poses;
+}
+
 /// Lets Ctrl-C end a long call.
 inline void checkSignals() {
   const py::gil_scoped_acquire held;

@@ -119,15 +119,8 @@ std::vector<StampedPose> readPoses(const RecordingSource& source) {
   return poses;
 }
 
-/// Adds poses: times (n,), and matrices (n, 4, 4) or rows (n, 7).
 void addPoses(Mapper& mapper, const py::array_t<std::int64_t>& t_ns, const Array& T_world_rig) {
-  std::vector<StampedPose> poses;
-  for (py::ssize_t i = 0; i < t_ns.size(); ++i) {
-    const std::vector<py::ssize_t> shape(T_world_rig.shape() + 1,
-                                         T_world_rig.shape() + T_world_rig.ndim());
-    const Array one(shape, T_world_rig.data() + i * T_world_rig.size() / t_ns.size(), T_world_rig);
-    poses.push_back({t_ns.at(i), rigidOf(one, "T_world_rig")});
-  }
+  const std::vector<StampedPose> poses = stampedPoses(t_ns, T_world_rig);
   const py::gil_scoped_release released;
   for (const StampedPose& pose : poses) mapper.addPose(pose);
 }

@@ -46,15 +46,11 @@ class ProgressCalls {
 
 MapJob jobOf(const RecordingSource& source, const Options& options, const OnKeyframe& on_keyframe,
              const OnProgress& on_progress) {
-  MapJob job;
-  job.source = source;
-  job.options = options.values();
-  job.options.mapper.limits = source.limits;
+  MapJob job = MapJob::of(source, options);
   job.on_keyframe = [on_keyframe](const Keyframe& keyframe, const MappingRun&) {
     give(keyframe, on_keyframe);
   };
   job.on_progress = ProgressCalls(on_progress);
-  job.prepare();
   return job;
 }
 
@@ -67,13 +63,6 @@ MapResult mapRecordingInto(const RecordingSource& source, const Options& options
   job.force = force;
   job.stop = [stop] { return stop->load(); };
   return mapInto(std::move(job));
-}
-
-/// Throws the error of a result, as Python's translators know it.
-void rejectError(const MapResult& result) {
-  if (!result.error) return;
-  if (result.error->wrong) throw std::invalid_argument(result.error->text);
-  throw std::runtime_error(result.error->text);
 }
 
 /// The DSI of a window, its depths and its keyframe.
@@ -117,13 +106,12 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
       if (std::this_thread::get_id() == caller) checkSignals();
     };
     result = mapWindowInto(std::move(job));
-    rejectError(result);
+    result.rejectError();
   }
-  const auto& planes = result.report.options.mapper.keyframe.planes;
-  py::array_t<double> depths(planes.num_planes);
-  for (int plane = 0; plane < planes.num_planes; ++plane) {
-    depths.mutable_at(plane) = DepthPlanes(planes).depth(plane);
-  }
+  const DepthPlanes planes(result.report.options.mapper.keyframe.planes);
+  py::array_t<double> depths(planes.size());
+  for (int plane = 0; plane < planes.size(); ++plane)
+    depths.mutable_at(plane) = planes.depth(plane);
   const py::ssize_t row = dsi->size.width * py::ssize_t{sizeof(float)};
   const py::array values = sharedArray(
       py::dtype::of<float>(), {dsi->num_planes, dsi->size.height, dsi->size.width},
@@ -186,7 +174,7 @@ std::string trajectoryErrorJson(const Path& estimate, const Path& truth,
 /// Returns the true depth map of a folder that is nearest to a time, at most 1 ms away.
 py::array trueDepth(const Path& folder, std::int64_t t_ns) {
   const std::vector<TimedFile> series = depthSeries(folder, DepthSeriesRole::kTruth);
-  const TimedFile* nearest = nearestFile(series, t_ns, 1'000'000);
+  const TimedFile* nearest = nearestFile(series, t_ns, kSameTimeNs);
   if (nearest == nullptr) {
     throw std::runtime_error(folder.string() + ": none of its " + std::to_string(series.size()) +
                              " depth maps is within 1 ms of t = " + std::to_string(t_ns) + " ns");
@@ -196,18 +184,7 @@ py::array trueDepth(const Path& folder, std::int64_t t_ns) {
 
 void writePoses(const Path& file, const py::array_t<std::int64_t>& times_ns,
                 const Array& T_world_rig) {
-  const py::ssize_t count = times_ns.size();
-  if (times_ns.ndim() != 1 || T_world_rig.ndim() != 3 || T_world_rig.shape(0) != count ||
-      T_world_rig.shape(1) != 4 || T_world_rig.shape(2) != 4) {
-    throw std::invalid_argument("poses: expected times of shape (n,) and matrices (n, 4, 4)");
-  }
-  std::vector<StampedPose> poses;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const auto T = transformNear(Eigen::Map<const Matrix4>(T_world_rig.data(i, 0, 0)));
-    if (!T) throw std::invalid_argument("poses: matrix " + std::to_string(i) + " is not rigid");
-    poses.push_back({times_ns.at(i), *T});
-  }
-  writeTumTrajectory(file, poses);
+  writeTumTrajectory(file, stampedPoses(times_ns, T_world_rig));
 }
 
 }  // namespace
@@ -228,7 +205,7 @@ void defineJobs(py::module_& module) {
       .def(
           "save", [](const MapResult& r, const Path& file) { savePoints(*r.map->points, file); },
           releases)
-      .def("reject_error", &rejectError);
+      .def("reject_error", &MapResult::rejectError);
   module.def("run_map", &mapRecordingInto, releases);
   module.def("run_dsi", &mapDsi);
   module.def("read_info", &infoOf, releases);

@@ -143,8 +143,6 @@ int runInfo(const InfoArguments& arguments) {
   if (arguments.system) printSystem();
   if (arguments.source.files.empty()) return 0;
   RecordingSource source = arguments.source;
-  source.faults.latency_ns = 0;  // latency changes no time stamp
-  source.complete = false;
   source.limits = RecordingTimes(source).resolve(arguments.times);
   RecordingInfo info;
   {

@@ -26,8 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kSameTimeNs = 1'000'000;
-
 ComparedDepths readDepths(const EvaluatedMap& map, const cv::Mat1b& mask,
                           const DepthEvaluationOptions& options) {
   return {readDepthFile(map.estimate, options.png_scale),

@@ -47,6 +47,9 @@ enum class DepthSeriesRole { kEstimate, kTruth };
 /// For truth, the dataset's list is searched before the maps of `map`.
 std::vector<TimedFile> depthSeries(const std::filesystem::path& folder, DepthSeriesRole role);
 
+/// A depth map and its truth are at most this time apart.
+inline constexpr std::int64_t kSameTimeNs = 1'000'000;
+
 /// Returns the file nearest in time to `t_ns`. If two files are equally near, it is the earlier
 /// file. Returns null if no file is within `within_ns`.
 /// @param series in the order of time.

@@ -24,6 +24,20 @@
 
 namespace efm {
 
+void MapResult::rejectError() const {
+  if (error && error->wrong) throw std::invalid_argument(error->text);
+  if (error) throw std::runtime_error(error->text);
+}
+
+MapJob MapJob::of(RecordingSource source, const Options& options) {
+  MapJob job;
+  job.source = std::move(source);
+  job.options = options.values();
+  job.options.mapper.limits = job.source.limits;
+  job.prepare();
+  return job;
+}
+
 RecordingSource MapJob::sourceNow() const {
   RecordingSource now = source;
   now.calibration = options.rig.calibration;
@@ -562,15 +576,10 @@ MapResult mapWindowInto(MapJob job) {
 Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options,
                     const Overrides& overrides) {
-  MapJob job;
-  job.source = sourceOf(files, overrides);
-  job.options = options.values();
-  job.options.mapper.limits = overrides.limits;
+  MapJob job = MapJob::of(sourceOf(files, overrides), options);
   job.out = out;
-  job.prepare();
   MapResult result = mapInto(std::move(job));
-  if (result.error && result.error->wrong) throw std::invalid_argument(result.error->text);
-  if (result.error) throw std::runtime_error(result.error->text);
+  result.rejectError();
   MapReport& report = result.report;
   std::string json = reportJson(report);
   return {report.counts.keyframes, report.points, std::move(report.warnings),

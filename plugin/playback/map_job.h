@@ -44,6 +44,9 @@ struct MapJob {
   /// several threads at once.
   std::function<void(int plane, int num_planes, const cv::Mat1f& values)> on_dsi_plane;
 
+  /// Returns the prepared job of a program that gives options; its limits are those of the source.
+  static MapJob of(RecordingSource source, const Options& options);
+
   /// Returns the recording for the options so far: the stride may be chosen later. It is the length
   /// of tracker noise that is constant over a keyframe.
   RecordingSource sourceNow() const;
@@ -62,6 +65,9 @@ struct MapResult {
   std::optional<UserError> error;
   bool kept_earlier = false;  ///< There is no new result: the folder's earlier result stays.
 
+  /// Throws the error, if there is one: std::invalid_argument for an option, else
+  /// std::runtime_error.
+  void rejectError() const;
   /// Returns whether there are keyframes, but no point.
   bool isWithoutPoints() const { return report.counts.keyframes > 0 && report.points == 0; }
 };

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin/results/output/report.h"
 #include "plugin/session/first_look.h"
 #include "plugin/session/session_status.h"
 
@@ -103,15 +104,8 @@ std::string infoJson(const RecordingInfo& info) {
   json["others"] = info.others;
   json["sorted_events"] = info.counts.sorted_events;
   json["true_depth_maps"] = info.true_depth_maps;
-  json["chosen"] = Json::array();
-  for (const ChosenOption& option : info.chosen) {
-    json["chosen"].push_back(
-        {{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
-  }
-  json["warnings"] = Json::array();
-  for (const Warning& warning : info.warnings) {
-    json["warnings"].push_back({{"name", warning.name}, {"text", warning.text}});
-  }
+  json["chosen"] = asJson(info.chosen);
+  json["warnings"] = asJson(info.warnings);
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

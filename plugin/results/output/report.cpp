@@ -165,6 +165,8 @@ Json asJson(const ReferenceView& view) {
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
 }
 
+}  // namespace
+
 Json asJson(const std::vector<ChosenOption>& chosen) {
   Json json = Json::array();
   for (const ChosenOption& option : chosen) {
@@ -180,8 +182,6 @@ Json asJson(const std::vector<Warning>& warnings) {
   }
   return json;
 }
-
-}  // namespace
 
 std::uint64_t peakMemoryBytes() {
   rusage usage{};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <nlohmann/json_fwd.hpp>
 
 #include <cstdint>
 #include <filesystem>
@@ -100,6 +101,10 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// value and reason), options (all options with the used values) and version. Bytes of names that
 /// are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
+
+/// Return lists of objects with the keys of the report: key, value and reason; name and text.
+nlohmann::ordered_json asJson(const std::vector<ChosenOption>& chosen);
+nlohmann::ordered_json asJson(const std::vector<Warning>& warnings);
 
 /// Returns the peak memory of this process so far.
 std::uint64_t peakMemoryBytes();
