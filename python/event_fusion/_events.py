@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import operator
 import os
-from collections.abc import Mapping as MappingType
+from collections.abc import Mapping
 from decimal import Decimal, InvalidOperation
-from typing import Any, Callable, Mapping, Union
+from functools import cache
+from typing import Any, Callable, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -154,10 +155,20 @@ def in_unit(records: Array, time_unit: str) -> Array:
     return records
 
 
-def nanoseconds(name: str, time: int | str | None, start: Callable[[], int | None]) -> int | None:
-    """Return a time as nanoseconds: integers are such; '3.2' is seconds, '+3.2' counts from the first event."""
-    if time is None or isinstance(time, (int, np.integer)):
-        return None if time is None else int(time)
+def times_in(source: _engine.Source, **times: int | str | None) -> list[int | None]:
+    """Return times of a recording as nanoseconds. The argument's names are for errors.
+
+    Integers are nanoseconds; '3.2' is seconds, '+3.2' counts from the first event.
+    """
+    start = cache(lambda: _engine.first_event(source))
+    return [_nanoseconds(name, time, start) for name, time in times.items()]
+
+
+def _nanoseconds(name: str, time: int | str | None, start: Callable[[], int | None]) -> int | None:
+    if time is None:
+        return None
+    if isinstance(time, (int, np.integer)):
+        return int(time)
     try:
         if not isinstance(time, str):
             raise ValueError
@@ -177,7 +188,7 @@ def engine_options(options: Options | None) -> _engine.Options:
     made = _engine.Options()
     if isinstance(options, (str, os.PathLike)):
         made.read(os.fspath(options))
-    elif options is not None and not isinstance(options, MappingType):
+    elif options is not None and not isinstance(options, Mapping):
         raise TypeError(f"options = {options!r}: expected {{'section.key': value, …}}, or the path of an .ini file")
     else:
         for key, value in (options or {}).items():
@@ -191,7 +202,7 @@ def engine_options(options: Options | None) -> _engine.Options:
 
 
 class ProgressBar:
-    """Calls of the engine, as the progress that a user asked for. A context: its end closes the bar."""
+    """Calls of the engine, as the progress that a user asked for. A context gives what to call, and closes the bar."""
 
     def __init__(self, progress: Progress) -> None:
         self._callback = progress if callable(progress) else None
@@ -214,13 +225,18 @@ class ProgressBar:
             self.close()
             shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
             self._bar = self._make(total=100, desc=activity, leave=False, bar_format=shown)
-            self._bar.desc = activity
         self._bar.update(100 * fraction - self._bar.n)
 
     @property
-    def used(self) -> bool:
-        """Whether anybody gets the progress."""
-        return self._callback is not None or self._make is not None
+    def callback(self) -> Callable[[str, float], None] | None:
+        """What the engine calls; None if nobody gets the progress."""
+        return None if self._callback is None and self._make is None else self
+
+    def __enter__(self) -> Callable[[str, float], None] | None:
+        return self.callback
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Remove the bar."""

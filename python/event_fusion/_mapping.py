@@ -27,7 +27,7 @@ from ._events import (
     ProgressBar,
     engine_options,
     event_records,
-    nanoseconds,
+    times_in,
     whole,
 )
 from ._recording import Recording, open
@@ -243,7 +243,7 @@ class Map:
         stop = self._stop = _engine.StopFlag()
         # With `keep`, the mapping need not wait for the loop.
         items: queue.Queue[Any] = queue.Queue(0 if keep else 2)
-        on_progress = self._bar if self._bar.used else None
+        on_progress = self._bar.callback
         folder = "" if out is None else os.fspath(out)
         source = recording._source
 
@@ -422,12 +422,12 @@ class Dsi(tuple):  # type: ignore[type-arg]
         return f"<Dsi of shape {self.values.shape}, {self.depths[0]:.3g} to {self.depths[-1]:.3g} m>"
 
     @property
-    def values(self) -> Array:  # noqa: D102
+    def values(self) -> Array:
         values: Array = self[0]
         return values
 
     @property
-    def depths(self) -> Array:  # noqa: D102
+    def depths(self) -> Array:
         depths: Array = self[1]
         return depths
 
@@ -463,23 +463,11 @@ def dsi(
     OSError
         If the recording cannot be read, or the window has no keyframe.
     """
-
     source = _opened(recording)._source
-
-    def start() -> int | None:
-        return _engine.first_event(source)
-
-    t0_ns, t1_ns, t_ref_ns = (
-        nanoseconds(name, time, start) for name, time in (("t0", t0), ("t1", t1), ("t_ref", t_ref))
-    )
+    t0_ns, t1_ns, t_ref_ns = times_in(source, t0=t0, t1=t1, t_ref=t_ref)
     checked = engine_options(options)
-    bar = ProgressBar(progress)
-    try:
-        values, depths, keyframe = _engine.run_dsi(
-            source, checked, t0_ns, t1_ns, t_ref_ns, bar if bar.used else None
-        )
-    finally:
-        bar.close()
+    with ProgressBar(progress) as on_progress:
+        values, depths, keyframe = _engine.run_dsi(source, checked, t0_ns, t1_ns, t_ref_ns, on_progress)
     made = Dsi((values, depths))
     made.keyframe = keyframe
     return made

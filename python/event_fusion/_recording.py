@@ -12,7 +12,7 @@ from typing import Any, Iterator, Sequence
 
 from . import _engine
 from ._engine import Camera
-from ._events import Array, Path, Progress, ProgressBar, in_unit, nanoseconds, whole, _ns_per
+from ._events import Array, Path, Progress, ProgressBar, in_unit, times_in, whole, _ns_per
 
 
 class Recording:
@@ -151,10 +151,7 @@ def open(
         files, *given, format, list(topics), event_columns, time_unit, sensor_size, skip_bad_events
     )
 
-    def start() -> int | None:
-        return _engine.first_event(source)
-
-    source.set_limits(nanoseconds("t0", t0, start), nanoseconds("t1", t1, start))
+    source.set_limits(*times_in(source, t0=t0, t1=t1))
     return Recording(files, source)
 
 
@@ -195,11 +192,8 @@ def simulate(
     """
     temporary = tempfile.TemporaryDirectory(prefix="event_fusion_") if out is None else None
     folder = os.fspath(out) if out is not None else str(pathlib.Path(temporary.name) / preset)  # type: ignore[union-attr]
-    bar = ProgressBar(progress)
-    try:
-        _engine.simulate(folder, preset, seed, duration, bar if bar.used else None)
-    finally:
-        bar.close()
+    with ProgressBar(progress) as on_progress:
+        _engine.simulate(folder, preset, seed, duration, on_progress)
     recording = open(folder)
     recording._temporary = temporary  # type: ignore[attr-defined]  # removed with the recording
     return recording

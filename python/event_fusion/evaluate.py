@@ -119,18 +119,22 @@ def depth(
     return errors
 
 
+def xyz_of(value: Union[Map, Mapper, Array]) -> Array:
+    """Return the points of a map, of a structured array or of (n, 3) as (n, 3)."""
+    points = np.asarray(value.points if isinstance(value, (Map, Mapper)) else value)
+    if points.dtype.names is not None:
+        points = np.stack([points[axis] for axis in "xyz"], axis=1)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"points of shape {points.shape}: expected a map, (n, 3), or the fields x, y, z")
+    return points
+
+
 def _cloud_file(value: Any, file: pathlib.Path) -> str:
     """Return the path of a cloud; maps and arrays are written to a file."""
     value = _recorded(value)
     if _is_path(value):
         return str(os.fspath(value))
-    if isinstance(value, (Map, Mapper)):
-        value = value.points
-    points = np.asarray(value)
-    if points.dtype.names is not None:
-        points = np.stack([points[axis] for axis in "xyz"], axis=1)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"points of shape {points.shape}: expected (n, 3), or the fields x, y, z")
+    points = xyz_of(value)
     properties = "".join(f"property double {axis}\n" for axis in "xyz")
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{properties}end_header\n"
     file.write_bytes(header.encode() + np.ascontiguousarray(points, "<f8").tobytes())

@@ -25,7 +25,7 @@ from ._engine import Keyframe
 from ._events import Array, Path
 from ._mapping import Map, Mapper
 from ._recording import Recording
-from .evaluate import true_depth
+from .evaluate import true_depth, xyz_of
 
 __all__ = ["confidence", "depth", "error", "map", "precision_recall", "trajectory"]
 
@@ -51,6 +51,10 @@ def _axes(ax: Axes | None) -> Axes:
     return pyplot.subplots(layout="constrained", dpi=_DOTS_PER_INCH / 2)[1] if ax is None else ax
 
 
+def _colour_bar(ax: Axes, drawn: Any, label: str, extend: str = "neither") -> Any:
+    return ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.035, 1]), label=label, extend=extend)
+
+
 def _image(
     ax: Axes, values: Array, label: str, ticks: Sequence[float] | None = None, extend: str = "neither", **style: Any
 ) -> Axes:
@@ -60,7 +64,7 @@ def _image(
     drawn = ax.imshow(values, interpolation="nearest", **style)
     ax.set_xticks([])
     ax.set_yticks([])
-    bar = ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.035, 1]), label=label, extend=extend)
+    bar = _colour_bar(ax, drawn, label, extend)
     if ticks is not None:
         bar.set_ticks(ticks)
         bar.set_ticklabels([f"{tick:.2g}" for tick in ticks])
@@ -251,7 +255,7 @@ def _direction(direction: Array) -> str:
     return f"{'' if exact else 'about '}{'-' if direction[axis] < 0 else ''}{'xyz'[axis]}"
 
 
-def map(  # noqa: A001
+def map(
     points: Union[Map, Mapper, Array],
     ax: Axes | None = None,
     *,
@@ -271,16 +275,10 @@ def map(  # noqa: A001
     size : float
         Area of a point in square typographic points; by default by the number of points.
     """
-    path = None
-    if isinstance(points, (Map, Mapper)):
-        path = points.trajectory[1][:, :3, 3]
+    cloud = xyz_of(points)
+    poses = points.trajectory[1] if isinstance(points, (Map, Mapper)) else np.empty((0, 4, 4))
     if up is None:
-        up = -np.mean(points.trajectory[1][:, :3, 1], axis=0) if isinstance(points, (Map, Mapper)) else (0, 0, 1)
-    cloud = points.points if isinstance(points, (Map, Mapper)) else np.asarray(points)
-    if cloud.dtype.names is None and (cloud.ndim != 2 or cloud.shape[1] != 3):
-        raise ValueError(f"points of shape {cloud.shape}: expected a map, (n, 3), or the fields x, y, z")
-    if cloud.dtype.names is not None:
-        cloud = np.stack([cloud[axis] for axis in "xyz"], axis=1)
+        up = -np.mean(poses[:, :3, 1], axis=0) if len(poses) else (0, 0, 1)
     ax = _axes(ax)
     upward = np.asarray(up, float)
     if upward.shape != (3,) or not np.linalg.norm(upward) > 0:
@@ -291,12 +289,13 @@ def map(  # noqa: A001
     right = right - right @ upward * upward
     right /= np.linalg.norm(right)
     across = np.cross(upward, right)
+    plan = np.stack([right, across], axis=1)
+    flat, path = cloud @ plan, poses[:, :3, 3] @ plan
     height = cloud @ upward
     order = np.argsort(height)
     lowest, highest = np.percentile(height, [1, 99]) if len(cloud) else (0.0, 1.0)
     drawn = ax.scatter(
-        (cloud @ right)[order],
-        (cloud @ across)[order],
+        *flat[order].T,
         c=height[order],
         s=np.clip(4e4 / max(len(cloud), 1), 1, 12) if size is None else size,
         marker=".",
@@ -306,19 +305,17 @@ def map(  # noqa: A001
         vmax=highest,
         rasterized=True,
     )
-    ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.035, 1]), label="height [m]")
-    if path is not None:
-        ax.plot(path @ right, path @ across, "-", color="black", linewidth=1, label="keyframes")
-        ax.plot(path[:1] @ right, path[:1] @ across, "o", color="black", markersize=3)
+    _colour_bar(ax, drawn, "height [m]")
+    if len(path):
+        ax.plot(*path.T, "-", color="black", linewidth=1, label="keyframes")
+        ax.plot(*path[:1].T, "o", color="black", markersize=3)
         ax.legend(frameon=False, fontsize="small")
     if len(cloud):  # a few far points do not set the limits
-        for axis, values in (("x", cloud @ right), ("y", cloud @ across)):
-            shown = np.percentile(values, [0.5, 99.5])
-            if path is not None:
-                along = path @ (right if axis == "x" else across)
-                shown = min(shown[0], along.min()), max(shown[1], along.max())
-            margin = 0.05 * (shown[1] - shown[0]) + 1e-3
-            ax.set(**{f"{axis}lim": (shown[0] - margin, shown[1] + margin)})
+        shown = np.concatenate([np.percentile(flat, [0.5, 99.5], axis=0), path])
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        margin = 0.05 * (high - low) + 1e-3
+        (left, bottom), (right_end, top) = low - margin, high + margin
+        ax.set(xlim=(left, right_end), ylim=(bottom, top))
     else:
         ax.text(0.5, 0.5, "no points", transform=ax.transAxes, ha="center", va="center")
     names = [_direction(direction) for direction in (right, across)]
