@@ -86,10 +86,13 @@ class Interruption : public AppTest {
 };
 
 TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
-  const Seconds whole = timeOfARun();
+  Seconds whole = timeOfARun();
   int stopped = 0;
   int with_keyframes = 0;
-  for (int trial = 0; trial < 20; ++trial) {
+  // A machine with other work changes its speed: then most signals come too early or too late.
+  const auto rare = [&] { return stopped < 5 || with_keyframes < 3; };
+  for (int trial = 0; trial < 20 || (rare() && trial < 80); ++trial) {
+    if (trial % 20 == 0 && trial > 0) whole = timeOfARun();
     fs::remove_all(out());
     const Seconds delay = std::uniform_real_distribution<>(0, 1.02)(random_) * whole;
     SCOPED_TRACE(testing::Message()
@@ -107,8 +110,7 @@ TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
     stopped += was_stopped ? 1 : 0;
     with_keyframes += was_stopped && reportIn("out")["keyframes"] > 0 ? 1 : 0;
   }
-  EXPECT_GE(stopped, 5) << "at random times of a run, most signals find it at work";
-  EXPECT_GE(with_keyframes, 3);
+  EXPECT_FALSE(rare()) << stopped << " runs were stopped, " << with_keyframes << " with keyframes";
 }
 
 TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
@@ -131,7 +133,7 @@ TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
 TEST_F(Interruption, AKilledMapLooksCompleteOnlyIfItIs) {
   const Seconds whole = timeOfARun();
   int incomplete = 0;
-  for (int trial = 0; trial < 12; ++trial) {
+  for (int trial = 0; trial < 12 || (incomplete < 2 && trial < 48); ++trial) {
     const Seconds delay = std::uniform_real_distribution<>(0.2, 0.9)(random_) * whole;
     SCOPED_TRACE(testing::Message()
                  << trial << ": after " << delay.count() << " s of " << whole.count());
