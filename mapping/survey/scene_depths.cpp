@@ -59,7 +59,8 @@ void SpreadSamples::add(const WindowData& data) {
 
 namespace {
 
-constexpr double kPieceS = 0.5;
+constexpr double kPieceS = 1;
+constexpr double kShortPieceS = 0.25;
 constexpr std::size_t kPieces = 4;
 
 /// Replaces the poses of each 20 ms by their mean: tracker jitter is not a mistake to search for.
@@ -114,7 +115,7 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
     const std::int64_t whole_ns = end_ns - begin_ns;
     const std::int64_t length_ns =
         std::min({whole_ns, durationFromSeconds(kPieceS),
-                  std::max(whole_ns / 2, durationFromSeconds(kPieceS / 2))});
+                  std::max(whole_ns / 2, durationFromSeconds(kShortPieceS))});
     if (length_ns <= 0) continue;
     for (std::size_t i = 0; i < of_each; ++i) {
       const auto t0_ns = begin_ns + (whole_ns - length_ns) * static_cast<std::int64_t>(2 * i + 1) /

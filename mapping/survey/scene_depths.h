@@ -53,7 +53,7 @@ class SpreadSamples {
   std::size_t windows_ = 0;
 };
 
-/// A short part of a sample, of half a second or less.
+/// A short part of a sample, of a second or less.
 struct SamplePiece {
   Window window;
   std::vector<std::vector<Event>> events;  // of each camera, evenly chosen

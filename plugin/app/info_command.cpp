@@ -152,6 +152,7 @@ int runInfo(const InfoArguments& arguments) {
   if (arguments.verbosity != Verbosity::kQuiet) print(info);
   if (info.error) std::rethrow_exception(info.error);
   printWarnings(info.warnings);
+  printWarnings(info.notes, "note");
   return arguments.strict && failStrictly(info.warnings) ? kFailedStatus : 0;
 }
 

@@ -80,7 +80,7 @@ struct MapCommand {
     if (!arguments.config.empty()) job.inputs = {findConfig(arguments.config)};
     job.verbosity = arguments.verbosity;
     job.stop = [this] { return interruption.requested(); };
-    job.warn = printWarnings;
+    job.warn = [](const std::vector<Warning>& warnings) { printWarnings(warnings); };
     job.note = [](const std::string& text) { std::cerr << "event-fusion: note: " << text << "\n"; };
   }
 

@@ -12,9 +12,9 @@
 
 namespace efm {
 
-void printWarnings(const std::vector<Warning>& warnings) {
+void printWarnings(const std::vector<Warning>& warnings, const char* kind) {
   for (const Warning& warning : warnings) {
-    std::cerr << "event-fusion: warning: " << warning.name << ": " << warning.text << "\n";
+    std::cerr << "event-fusion: " << kind << ": " << warning.name << ": " << warning.text << "\n";
   }
 }
 

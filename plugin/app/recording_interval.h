@@ -16,7 +16,8 @@
 namespace efm {
 
 /// Prints a line per warning to stderr: "event-fusion: warning: NAME: text".
-void printWarnings(const std::vector<Warning>& warnings);
+/// @param kind "note" in place of "warning".
+void printWarnings(const std::vector<Warning>& warnings, const char* kind = "warning");
 
 /// Prints an error if there are warnings, for --strict. @return true if there are warnings.
 bool failStrictly(const std::vector<Warning>& warnings);

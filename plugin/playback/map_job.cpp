@@ -288,6 +288,10 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
   PoseVerdict verdict = survey.judgePoses(options.mapper);
   append(report.warnings, std::move(verdict.warnings));
   warnOfNew();
+  for (const Warning& note : verdict.notes) {
+    if (job.note) job.note(note.name + ": " + note.text);
+  }
+  report.notes = std::move(verdict.notes);
   append(report.doubts, std::move(verdict.doubts));
   if (!held->isWhole()) return nullptr;
   return held;

@@ -239,6 +239,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   findings.options = &options;
   findings.depths = &depths_;
   append(report.warnings, warningsOf(findings));
+  append(report.notes, std::move(status.pose_notes));
   dropExplainedBlur(report.warnings);
   if (status.counts.event_uses > 0 || error_ || stopped) return;
   const bool outside = !status.events && !recording_.rig().cameras.empty() &&

@@ -27,7 +27,9 @@ void judge(FirstLook* look, RecordingInfo& info) {
           chooseOptions(defaults.automatic, survey.rig, survey.samples, survey.duration_s, options)
               .options;
       findings.use(options.keyframe.planes, info.chosen);
-      info.warnings = survey.judgePoses(options).warnings;
+      PoseVerdict verdict = survey.judgePoses(options);
+      info.warnings = std::move(verdict.warnings);
+      info.notes = std::move(verdict.notes);
     }
   }
   append(info.warnings, warningsOf(findings));
@@ -106,6 +108,7 @@ std::string infoJson(const RecordingInfo& info) {
   json["true_depth_maps"] = info.true_depth_maps;
   json["chosen"] = asJson(info.chosen);
   json["warnings"] = asJson(info.warnings);
+  json["notes"] = asJson(info.notes);
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -25,6 +25,7 @@ struct RecordingInfo {
   std::size_t true_depth_maps = 0;
   std::vector<ChosenOption> chosen;  ///< The values that `map` would choose by default.
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;  ///< What could not be checked.
   /// Why the recording was not read to its end, or has no events within its limits. There are
   /// neither chosen values nor warnings then. Null without error.
   std::exception_ptr error;
@@ -36,7 +37,7 @@ struct RecordingInfo {
 RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>& progress);
 
 /// Returns the info as JSON: observations, cameras, poses (by source), events_before_poses,
-/// events_after_poses, others, sorted_events, true_depth_maps, chosen and warnings.
+/// events_after_poses, others, sorted_events, true_depth_maps, chosen, warnings and notes.
 std::string infoJson(const RecordingInfo& info);
 
 /// Rejects time limits without events: they may be mistyped. A recording without cameras passes.

@@ -104,7 +104,9 @@ bool MappingSession::chooseFromFirstLook() {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
                                       finished_ ? survey.duration_s : std::nullopt, chosen);
-  status_.pose_warnings = survey.judgePoses(chosen).warnings;
+  PoseVerdict verdict = survey.judgePoses(chosen);
+  status_.pose_warnings = std::move(verdict.warnings);
+  status_.pose_notes = std::move(verdict.notes);
   if (finished_) {  // no more data: following limits would be no better
     use(std::move(choice), chosen);
     depth_follower_.reset();

@@ -142,79 +142,6 @@ void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
   }
 }
 
-/// Returns the number of events of each column, or of each row.
-/// @param most counted events of a pixel.
-std::vector<double> eventsByLine(const CameraStatistics& camera, std::uint32_t most, bool columns) {
-  const auto width = static_cast<std::size_t>(camera.camera.model.width);
-  std::vector<double> lines(columns ? width : camera.pixels.size() / width);
-  for (std::size_t i = 0; i < camera.pixels.size(); ++i) {
-    lines[columns ? i % width : i / width] += std::min(camera.pixels[i], most);
-  }
-  return lines;
-}
-
-/// Returns the number of lines on one side without events, if the events begin sharply from one
-/// line to the next. The end of a scene is no sharp line, because motion blurs it over many lines.
-std::size_t linesOutside(const std::vector<double>& lines) {
-  constexpr double kMinOutside = 0.07;  // fraction of all lines; example: 320 of 346 columns
-  constexpr double kMaxEvents = 0.02;   // per line outside, relative to a line inside
-  constexpr double kMinAtEdge = 0.3;    // per line at the edge, relative to a line inside
-  const std::size_t size = lines.size();
-  const std::size_t edge = std::max<std::size_t>(3, size / 50);
-  double outside = 0;
-  double inside = std::accumulate(lines.begin(), lines.end(), 0.0);
-  std::size_t found = 0;
-  double density = 0;  // events per line inside
-  for (std::size_t k = 1; k + edge < size; ++k) {
-    outside += lines[k - 1];
-    inside -= lines[k - 1];
-    const auto from = lines.begin() + static_cast<std::ptrdiff_t>(k);
-    const double mean = inside / static_cast<double>(size - k);
-    const double at_edge = std::accumulate(from, from + static_cast<std::ptrdiff_t>(edge), 0.0) /
-                           static_cast<double>(edge);
-    const bool is_empty = outside <= kMaxEvents * mean * static_cast<double>(k);
-    if (!is_empty || mean <= 0 || at_edge < kMinAtEdge * mean) continue;
-    found = k;
-    density = mean;
-  }
-  while (found > 0 && lines[found - 1] >= kMinAtEdge * density) --found;
-  return static_cast<double>(found) >= kMinOutside * static_cast<double>(size) ? found : 0;
-}
-
-/// Returns the first and the last line with events.
-std::pair<std::size_t, std::size_t> linesInside(std::vector<double> lines) {
-  const std::size_t first = linesOutside(lines);
-  std::reverse(lines.begin(), lines.end());
-  return {first, lines.size() - 1 - linesOutside(lines)};
-}
-
-void checkSensorArea(const Cameras& cameras, Warnings& warnings) {
-  // Fraction of active pixels in the area. With fewer, only some edges of the scene have events.
-  constexpr double kMinActive = 0.2;
-  for (const auto& [key, camera] : cameras) {
-    std::vector<std::uint32_t> active;
-    for (const std::uint32_t events : camera.pixels) {
-      if (events > 0) active.push_back(events);
-    }
-    if (active.size() < kEnoughEvents) continue;
-    const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
-    std::nth_element(active.begin(), middle, active.end());
-    const std::uint32_t most = 2 * *middle;  // limit for a hot pixel
-    const auto [left, right] = linesInside(eventsByLine(camera, most, true));
-    const auto [top, bottom] = linesInside(eventsByLine(camera, most, false));
-    const std::size_t area = (right - left + 1) * (bottom - top + 1);
-    if (area == camera.pixels.size()) continue;
-    if (static_cast<double>(active.size()) < kMinActive * static_cast<double>(area)) continue;
-    const CameraModel& model = camera.camera.model;
-    addWarning(warnings, "sensor-area",
-               "camera {} has events in columns {} to {} of 0 to {} and rows {} to {} of 0 to "
-               "{} alone: are its pictures cropped, or its pixels binned? The calibration "
-               "must be of the pixels that the events have: the resolution, and cx and cy "
-               "less by an offset that was cut off (--calibration)",
-               key.first, left, right, model.width - 1, top, bottom, model.height - 1);
-  }
-}
-
 void checkCameraClocks(const Cameras& cameras, Warnings& warnings) {
   // Cameras of a rig are started together. If they share less than half of the shorter stream's
   // time, their clocks have different zeros, or the files are from two recordings.
@@ -254,19 +181,23 @@ void checkTwins(const Cameras& cameras, Warnings& warnings) {
 
 }  // namespace
 
+Warnings calibrationWarnings(int camera, const CameraModel& model) {
+  Warnings warnings;
+  if (!isCalibrated(model)) return warnings;
+  checkFieldOfView(camera, model, warnings);
+  checkPrincipalPoint(camera, model, warnings);
+  checkLens(camera, model, warnings);
+  return warnings;
+}
+
 void checkCameras(const Findings& findings, Warnings& warnings) {
   const Cameras& cameras = findings.recording.cameras();
   checkBaselines(cameras, warnings);
   for (const auto& [key, camera] : cameras) {
-    const CameraModel& model = camera.camera.model;
-    if (!isCalibrated(model)) continue;
-    checkFieldOfView(key.first, model, warnings);
-    checkPrincipalPoint(key.first, model, warnings);
-    checkLens(key.first, model, warnings);
+    append(warnings, calibrationWarnings(key.first, camera.camera.model));
   }
   checkActivity(cameras, warnings);
   checkHotPixels(cameras, warnings);
-  checkSensorArea(cameras, warnings);
   checkCameraClocks(cameras, warnings);
   checkTwins(cameras, warnings);
 }

@@ -33,18 +33,23 @@ EventPacket subsampled(const EventPacket& packet) {
   return chosen;
 }
 
-/// Returns the warning about the poses. A known mistake explains more than different depths do.
-std::optional<Warning> mistakeIn(const RecordingSurvey& survey,
-                                 const FusionMapperOptions& options) {
-  const auto finding = checkPoses(survey.rig, survey.samples, options);
-  if (finding && finding->mistake != PoseMistake::kUnknown) {
-    return poseWarning(*finding, survey.rig);
+/// Judges the poses. A known mistake explains more than different depths do.
+void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
+           PoseVerdict& verdict) {
+  const PoseJudgement judgement = checkPoses(survey.rig, survey.samples, options);
+  const auto& finding = judgement.finding;
+  std::optional<Warning> warning;
+  if (!finding || finding->mistake == PoseMistake::kUnknown) {
+    const auto agreement = depthAgreement(survey.rig, survey.samples, options);
+    if (agreement) warning = agreementWarning(*agreement);
+    if (warning && !judgement.unchecked.empty()) warning->text += "; but " + judgement.unchecked;
   }
-  if (const auto agreement = depthAgreement(survey.rig, survey.samples, options)) {
-    if (const auto warning = agreementWarning(*agreement)) return warning;
+  if (!warning && finding) warning = poseWarning(*finding, survey.rig);
+  if (warning) {
+    verdict.warnings.push_back(*warning);
+  } else if (!judgement.unchecked.empty()) {
+    verdict.notes.push_back({"poses-unchecked", judgement.unchecked});
   }
-  if (finding) return poseWarning(*finding, survey.rig);
-  return std::nullopt;
 }
 
 }  // namespace
@@ -60,8 +65,13 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
                lever_m, kMaxLeverM);
     return verdict;
   }
+  for (const RigCamera& camera : rig.cameras) {
+    for (const Warning& warning : calibrationWarnings(0, camera.model)) {
+      if (warning.name != "principal-point") return verdict;  // no pose explains such rays
+    }
+  }
   try {
-    if (const auto warning = mistakeIn(*this, options)) verdict.warnings.push_back(*warning);
+    judge(*this, options, verdict);
     const auto sensitivity = depthSensitivity(rig, samples, options);
     if (!sensitivity) return verdict;
     if (const auto warning = sensitivityWarning(*sensitivity)) verdict.warnings.push_back(*warning);

@@ -18,6 +18,7 @@ namespace efm {
 /// Result of a first look at the poses.
 struct PoseVerdict {
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;       ///< What could not be checked.
   std::vector<std::string> doubts;  ///< Reasons why a map rests on little evidence.
 };
 

@@ -104,6 +104,8 @@ void append(std::vector<Value>& all, std::vector<Value> more) {
 
 // The parts of `warningsOf`, in files of their own.
 
+/// Returns the warnings about a camera's intrinsics.
+std::vector<Warning> calibrationWarnings(int camera, const CameraModel& model);
 /// Checks the cameras: their calibration, and their events.
 void checkCameras(const Findings& findings, std::vector<Warning>& warnings);
 /// Checks the motion of the poses against the events: repeated poses (`poses-frozen`), steps that

@@ -478,7 +478,10 @@ void MapperCore::publishState(std::exception_ptr& error) {
   }
   if (is_new_choice) {
     callBack(error, "the callback of the log", [&] {
-      if (callbacks_.info) callbacks_.info(choiceText(status));
+      if (callbacks_.info) {
+        callbacks_.info(choiceText(status));
+        for (const Warning& note : status.pose_notes) callbacks_.info(note.name + ": " + note.text);
+      }
       if (!callbacks_.warn) return;
       std::vector<Warning> warnings = status.pose_warnings;
       if (status.scene_unknown && status.events && status.poses) {

@@ -18,6 +18,9 @@ constexpr NamedChoice<PoseMistake> kNames[] = {{PoseMistake::kInverted, "poses-i
                                                {PoseMistake::kStereoInverted, "cameras-swapped"},
                                                {PoseMistake::kAxes, "axis-convention"},
                                                {PoseMistake::kTimeShift, "time-shift"},
+                                               {PoseMistake::kCameraClock, "camera-clocks"},
+                                               {PoseMistake::kMirrored, "events-mirrored"},
+                                               {PoseMistake::kPixels, "sensor-area"},
                                                {PoseMistake::kUnknown, "poses-unexplained"}};
 
 /// Returns the axes of the rig as axes of the body: "-y, -z, x".
@@ -43,14 +46,42 @@ std::string matrixText(const Eigen::Matrix3d& R_body_rig) {
   return text + "[0, 0, 0, 1]]";
 }
 
-/// Returns one value per camera.
-std::string offsetsText(const Rig& rig, double shift_s) {
+/// Returns one value per camera. @param finding the shift, of all cameras or of one.
+std::string offsetsText(const Rig& rig, const PoseFinding& finding) {
   std::string text;
-  for (const RigCamera& camera : rig.cameras) {
-    const double offset_s = secondsBetween(0, camera.time_offset_ns) + shift_s;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const double shift_s = finding.camera.value_or(c) == c ? finding.shift_s : 0;
+    const double offset_s = secondsBetween(0, rig.cameras[c].time_offset_ns) + shift_s;
     text += (text.empty() ? "" : ",") + fmt::format("{:.3f}", offset_s);
   }
   return text;
+}
+
+std::string mirrorText(const PixelChange& pixels) {
+  if (pixels.exchange) {
+    return "columns and rows exchanged; x and y of the events are in the wrong order "
+           "(--event-columns)";
+  }
+  return fmt::format(
+      "{} mirrored; a driver or a mirror turned the picture over, which must be "
+      "undone in the recording: no calibration describes it",
+      pixels.mirror_x ? "columns" : "rows");
+}
+
+/// Returns the intrinsics that fit the pixels of the events, of the cameras whose pixels differ.
+std::string pixelText(const PixelChange& pixels, const Rig& rig) {
+  std::string text;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const Eigen::Vector2i& offset = pixels.offset_px[c];
+    if (offset.isZero()) continue;
+    const CameraModel& m = rig.cameras[c].model;
+    text +=
+        fmt::format("{}fx fy cx cy = {:g} {:g} {:g} {:g} of camera {}", text.empty() ? "" : ", ",
+                    m.fx, m.fy, m.cx - offset.x(), m.cy - offset.y(), c);
+  }
+  return "if their pictures are cropped or moved; the calibration must be of the pixels that the "
+         "events have: " +
+         text + " (--calibration)";
 }
 
 std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
@@ -75,8 +106,18 @@ std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
     case PoseMistake::kTimeShift:
       return fmt::format("with the poses {:.3f} s {}; --set rig.time_offsets_s={} fixes it{}",
                          std::abs(finding.shift_s), finding.shift_s < 0 ? "later" : "earlier",
-                         offsetsText(rig, finding.shift_s),
+                         offsetsText(rig, finding),
                          rig.cameras.size() > 1 ? "" : ", to some 30 ms: one camera tells no more");
+    case PoseMistake::kCameraClock:
+      return fmt::format(
+          "with the events of camera {} {:.3f} s {}, as its clock differs from that "
+          "of camera 0; --set rig.time_offsets_s={} fixes it",
+          *finding.camera, std::abs(finding.shift_s), finding.shift_s < 0 ? "earlier" : "later",
+          offsetsText(rig, finding));
+    case PoseMistake::kMirrored:
+      return "with " + mirrorText(finding.pixels);
+    case PoseMistake::kPixels:
+      return pixelText(finding.pixels, rig);
     case PoseMistake::kUnknown:
       break;
   }
@@ -88,31 +129,46 @@ std::string gainText(double gain) {
   return fmt::format("{:.1f} times as sharp", gain);
 }
 
-/// Returns the text of another possible mistake. Two mistakes share a name.
-std::string alternativeText(PoseMistake mistake) {
-  if (mistake == PoseMistake::kCamerasSwapped) return "the events of cameras 0 and 1 are exchanged";
-  if (mistake == PoseMistake::kStereoInverted) {
-    return "the transform between cameras 0 and 1 is inverted";
-  }
-  return fmt::format("it is {}", nameIn(kNames, mistake));
-}
-
 }  // namespace
 
 Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
   Warning warning;
   warning.name = nameIn(kNames, finding.mistake);
+  if (finding.mistake == PoseMistake::kUnknown && !finding.alternatives.empty()) {
+    std::string names;
+    for (const PoseMistake mistake : finding.alternatives) {
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", nameIn(kNames, mistake));
+    }
+    warning.text = fmt::format(
+        "the events are up to {} with other poses or pixels, but these data do not tell which of "
+        "several mistakes it is ({}); a longer recording, other motions or a second camera tell "
+        "(--poses, --hand-eye, --calibration)",
+        gainText(finding.gain), names);
+    return warning;
+  }
+  if (finding.mistake == PoseMistake::kPixels && finding.gain == 1) {
+    warning.text =
+        "the events leave a side of a sensor empty, and the poses do not explain them: are the "
+        "pictures cropped, or their pixels binned? The calibration must be of the pixels that the "
+        "events have: the resolution, and cx and cy less by an offset that was cut off "
+        "(--calibration)";
+    return warning;
+  }
   if (finding.mistake == PoseMistake::kUnknown) {
     warning.text =
         "the poses do not explain the events: wrong poses explain them as well; are poses, events "
-        "and calibration of one recording, and are the positions in metres? (--poses, "
+        "and calibration of one recording and of the same pixels, and are the positions in metres? "
+        "(--poses, "
         "--calibration, --hand-eye)";
     return warning;
   }
   warning.text =
       fmt::format("the events are {} {}", gainText(finding.gain), remedyOf(finding, rig));
-  for (const PoseMistake other : finding.alternatives) {
-    warning.text += fmt::format("; or {}, which explains them as well", alternativeText(other));
+  if (!finding.alternatives.empty()) {
+    warning.text += fmt::format("; or {}, which explains them as well",
+                                finding.mistake == PoseMistake::kCamerasSwapped
+                                    ? "the transform between cameras 0 and 1 is inverted"
+                                    : "the events of cameras 0 and 1 are exchanged");
   }
   return warning;
 }

@@ -158,6 +158,7 @@ struct SessionStatus {
   bool scene_unknown = false;            ///< True if the last choice found no scene: it is a guess.
   /// Playback with automatic options: the poses do not explain the events of the first look.
   std::vector<Warning> pose_warnings;
+  std::vector<Warning> pose_notes;            ///< What the first look could not check.
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
   std::optional<LiveStatus> live{};           ///< Set in live operation.
 };

@@ -93,7 +93,8 @@ class Recording:
             observations; cameras (name, width, height, calibrated, events, first_ns, last_ns, per_second, positive);
             poses, by source (source, used, poses, first_ns, last_ns, per_second, max_gap_s, path_m, max_speed_m_s,
             max_rotation_rad_s); events_before_poses, events_after_poses; others; sorted_events; true_depth_maps;
-            chosen (key, value, reason: the options that `map` would choose); warnings (name, text).
+            chosen (key, value, reason: the options that `map` would choose); warnings, and notes on what could not
+            be checked (name, text).
 
         Raises
         ------

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@ class ProgramTest : public TemporaryFolder {
     int status = 0;
     std::string out;
     std::string err;
+    std::string notes{};  ///< The lines "note: poses-unchecked", which short recordings have.
   };
 
   /// Runs a shell command.
@@ -38,8 +40,13 @@ class ProgramTest : public TemporaryFolder {
   }
   /// @param status from waitpid.
   Result resultOf(int status) const {
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"),
-            contentOf("stderr.txt")};
+    Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"), ""};
+    std::istringstream err(contentOf("stderr.txt"));
+    for (std::string line; std::getline(err, line);) {
+      const bool note = line.rfind("event-fusion: note: poses-unchecked", 0) == 0;
+      (note ? result.notes : result.err) += line + (err.eof() ? "" : "\n");
+    }
+    return result;
   }
   /// Runs event-fusion. Arguments are quoted as in a shell.
   virtual Result run(const std::string& arguments) const {

@@ -243,6 +243,7 @@ std::string reportJson(const MapReport& report) {
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
   if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
+  if (!report.notes.empty()) json["notes"] = asJson(report.notes);
   if (!report.doubts.empty()) json["doubtful"] = report.doubts;
   if (const MotionCounts& motion = report.counts.motion; motion.known > 0) {
     json["motion"] = {{"known", motion.known},

@@ -76,6 +76,7 @@ struct MapReport {
   std::optional<double> stopped_at;
   std::uint64_t skipped_events = 0;  ///< Bad events that the reader left out.
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;       ///< What could not be checked.
   std::vector<std::string> doubts;  ///< Reasons why the map has little evidence; usually none.
 };
 
@@ -96,10 +97,11 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// (the fraction of the recording that was mapped), live in live operation (drop_ratio; counts of
 /// each camera's events before the mapping; windows_given_up and the reasons; late_events,
 /// pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each with name and
-/// text), doubtful (reasons why the map has little evidence; absent if there are none), recording
-/// (the files), perturbation (the faults of the poses, if any), chosen (the automatic options: key,
-/// value and reason), options (all options with the used values) and version. Bytes of names that
-/// are not UTF-8 become U+FFFD.
+/// text), notes (the same; absent if there are none: what could not be checked), doubtful (reasons
+/// why the map has little evidence; absent if there are none), recording (the files), perturbation
+/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason),
+/// options (all options with the used values) and version. Bytes of names that are not UTF-8 become
+/// U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// Return lists of objects with the keys of the report: key, value and reason; name and text.
