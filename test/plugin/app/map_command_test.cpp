@@ -23,8 +23,10 @@ class MapCommand : public AppTest {};
 TEST_F(MapCommand, CountsOfTheReportAddUp) {
   const SyntheticRecording recording;
   write(recording);
-  const Result result = run("map rig.ini data --out out -v");
+  const Result result = run("map rig.ini data --out out -v --strict");
   ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_THAT(result.notes, HasSubstr("note: poses-unchecked: the clock of the poses could not "));
+  EXPECT_EQ(reportIn("out")["notes"][0]["name"], "poses-unchecked");
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 4) << "a line per keyframe";
   EXPECT_THAT(result.err, HasSubstr("keyframe 1 at 10.102000000 s (+0.1 s): 639 events, "));
   const auto poses = posesIn("out");
