@@ -210,6 +210,11 @@ void addSource(CLI::App& command, RecordingSource& source) {
                   "found, else s)")
       ->check(oneOf({"s", "ms", "us", "ns"}));
   command
+      .add_option("--pose-time-unit", source.reader.pose_time_unit,
+                  "The unit of times in text poses without a header (default: found, else "
+                  "--time-unit for whole numbers, else s)")
+      ->check(oneOf({"s", "ms", "us", "ns"}));
+  command
       .add_option_function<std::string>(
           "--sensor-size",
           [&source](const std::string& text) {

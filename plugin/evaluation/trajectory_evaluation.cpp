@@ -14,6 +14,7 @@
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/evaluation_text.h"
+#include "plugin/recordings/text/pose_text.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "plugin/results/pictures/picture.h"
 
@@ -127,8 +128,10 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
   const auto estimate_file =
       fileInFolder(estimated, {"trajectory.txt", "poses.txt", "groundtruth.txt"});
   const auto truth_file = fileInFolder(truth, {"poses.txt", "groundtruth.txt"});
-  const std::vector<StampedPose> estimate = readPosesFile(estimate_file);
-  const std::vector<StampedPose> true_poses = readPosesFile(truth_file);
+  const std::vector<StampedPose> estimate =
+      requirePoses(readPoseText(estimate_file, {}), estimate_file);
+  const std::vector<StampedPose> true_poses =
+      requirePoses(readPoseText(truth_file, {}), truth_file);
 
   TrajectoryEvaluation evaluation;
   evaluation.estimate_file = estimate_file;

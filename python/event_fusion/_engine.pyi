@@ -67,6 +67,7 @@ class Source:
         topics: Sequence[str],
         event_columns: str,
         time_unit: str,
+        pose_time_unit: str,
         sensor_size: Optional[tuple[int, int]],
         skip_bad_events: int,
     ) -> None: ...

@@ -120,6 +120,7 @@ def open(
     topics: Sequence[str] = (),
     event_columns: str = "",
     time_unit: str = "",
+    pose_time_unit: str = "",
     sensor_size: tuple[int, int] | None = None,
     skip_bad_events: int = 0,
 ) -> Recording:
@@ -134,7 +135,7 @@ def open(
     t0, t1 : int or str
         Only the events of [t0, t1) are read. Integers: nanoseconds on the clock of the poses. Text as on the command
         line: ``"3.2"`` is seconds on that clock, ``"+3.2"`` seconds from the first event on.
-    format, topics, event_columns, time_unit, sensor_size, skip_bad_events
+    format, topics, event_columns, time_unit, pose_time_unit, sensor_size, skip_bad_events
         What cannot be found in the files: the options of the command line with these names. `sensor_size` is (width,
         height).
 
@@ -149,7 +150,15 @@ def open(
     files = [os.fspath(file) for file in ([path] if isinstance(path, (str, os.PathLike)) else path)]
     given = (os.fspath(poses), os.fspath(calibration), os.fspath(hand_eye))
     source = _engine.Source(
-        files, *given, format, list(topics), event_columns, time_unit, sensor_size, skip_bad_events
+        files,
+        *given,
+        format,
+        list(topics),
+        event_columns,
+        time_unit,
+        pose_time_unit,
+        sensor_size,
+        skip_bad_events,
     )
 
     source.set_limits(*times_in(source, t0=t0, t1=t1))

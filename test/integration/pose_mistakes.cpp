@@ -196,7 +196,7 @@ std::vector<Mistake> poseMistakes() {
       {"whole numbers as times of poses",
        file("poses.txt", posesInMicroseconds()),
        {"error: data/poses.txt: all times are whole numbers, of an unknown unit: probably us, "
-        "where 50 poses take 0.49 s: expected --time-unit us"}},
+        "where 50 poses take 0.49 s: expected --pose-time-unit us"}},
   };
 }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <sstream>
@@ -58,6 +59,8 @@ Calibration readYamlCalibration(const std::filesystem::path& file) {
     if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
     if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
     if (entry.has("value0")) return readTumVieCalibration(entry, file);
+    if (entry.has("img_size")) return {file, {{{readMetavisionCamera(entry), {}, 0}}}};
+    if (entry.has("cameras")) return {file, readDvCameras(entry)};
     if (entry.has("camera_matrix")) return {file, {{{readCameraInfo(entry), {}, 0}}}};
   }
   throw std::runtime_error(
@@ -97,7 +100,8 @@ RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>
     if (!sensor) {
       throw std::invalid_argument(file.string() +
                                   ": no size of the sensor, and the recording does not say it: "
-                                  "expected a camera chain with resolution");
+                                  "expected --sensor-size WIDTHxHEIGHT, or a camera chain with "
+                                  "resolution");
     }
     camera.model.width = sensor->width;
     camera.model.height = sensor->height;
@@ -132,12 +136,23 @@ Calibration readCalibration(const std::filesystem::path& file) {
 
 Calibration readUzhCalibration(const std::filesystem::path& file) {
   const std::vector<double> numbers = readNumbers(file);
-  if (numbers.size() != 9) {
-    throw std::runtime_error(fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3",
-                                         file.string(), numbers.size()));
+  const bool sized = numbers.size() == 11;
+  if (numbers.size() != 9 && !sized) {
+    throw std::runtime_error(
+        fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3, or width height, too",
+                    file.string(), numbers.size()));
   }
-  const CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
-                                       {numbers.begin() + 4, numbers.end()});
+  CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
+                                 {numbers.begin() + 4, numbers.begin() + 9});
+  if (!sized) return {file, {{{model, {}, 0}}}};
+  for (const double side : {numbers[9], numbers[10]}) {
+    if (side >= 1 && side <= 65535 && std::floor(side) == side) continue;
+    throw std::runtime_error(
+        fmt::format("{}: {:g}: expected the sensor's width and height after nine numbers",
+                    file.string(), side));
+  }
+  model.width = static_cast<int>(numbers[9]);
+  model.height = static_cast<int>(numbers[10]);
   return {file, {{{model, {}, 0}}}};
 }
 
@@ -156,10 +171,18 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 
 Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration) {
   constexpr const char* kKey = "T_body_rig";
+  constexpr const char* kExpected =
+      "expected YAML, T_body_rig: 4 rows of 4 numbers, from the rig's frame to that of the tracked "
+      "body; or a Kalibr camera chain with T_cam_imu, easy_handeye's result, DSEC's "
+      "cam_to_lidar.yaml, or TUM-VIE's mocap-imu-calibration*.json";
+  if (file.extension() == ".npz" || file.extension() == ".npy") {
+    throw std::runtime_error(fmt::format("{}: a NumPy file: {}", file.string(), kExpected));
+  }
   const YAML::Node root = loadYaml(file.string());
   if (root.IsMap()) {
     const YamlEntry entry(file.string(), "", root);
     if (entry.has(kKey)) return entry.transform(kKey);
+    if (entry.has("transformation")) return readEasyHandEye(entry);
     if (entry.has("T_lidar_camRect1")) return readDsecHandEye(entry, calibration);
     if (entry.has("value0")) return readTumVieHandEye(entry, calibration);
     if (entry.has("cam0")) {
@@ -167,11 +190,7 @@ Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibra
       throw entry.section("cam0").fail("T_cam_imu is missing: expected 4 rows of 4 numbers");
     }
   }
-  throw std::runtime_error(
-      file.string() +
-      ": T_body_rig is missing: expected YAML, T_body_rig: 4 rows of 4 numbers, from the rig's "
-      "frame to that of the tracked body; or a Kalibr camera chain with T_cam_imu, DSEC's "
-      "cam_to_lidar.yaml, or TUM-VIE's mocap-imu-calibration*.json");
+  throw std::runtime_error(fmt::format("{}: T_body_rig is missing: {}", file.string(), kExpected));
 }
 
 }  // namespace efm

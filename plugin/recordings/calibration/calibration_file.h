@@ -50,17 +50,19 @@ struct Calibration {
 /// The files that `readCalibration` accepts, for errors.
 inline constexpr const char* kCalibrationFiles =
     "a Kalibr camera chain, DSEC's cam_to_cam.yaml, TUM-VIE's camera-calibration*.json, "
-    "camera_info YAML of ROS, an .ini file of MRPT's camera calibration, or nine numbers, fx fy cx "
-    "cy k1 k2 p1 p2 k3";
+    "camera_info YAML of ROS or OpenCV, JSON of Metavision or dv-processing, an .ini file of "
+    "MRPT's "
+    "camera calibration, or nine numbers, fx fy cx cy k1 k2 p1 p2 k3 (and width height)";
 
 /// Reads a calibration, whose kind is found by its content: see `readCamchain`,
-/// `readDsecCalibration`, `readTumVieCalibration`, `readCameraInfo`, `readMrptCameras` and
-/// `readUzhCalibration`; the file of `readUzhCalibration` does not have the sensor's size.
+/// `readDsecCalibration`, `readTumVieCalibration`, `readCameraInfo`, `readMetavisionCamera`,
+/// `readDvCameras`, `readMrptCameras` and `readUzhCalibration`; the file of `readUzhCalibration`
+/// does not have the sensor's size.
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
-/// radtan with five coefficients, even if all are zero. The file does not have the sensor's size:
-/// width and height are 0.
+/// radtan with five coefficients, even if all are zero. Two more numbers are the sensor's width and
+/// height; without them, these are 0.
 Calibration readUzhCalibration(const std::filesystem::path& file);
 
 /// Makes a radtan lens without the sensor's size, which is not in the file.
@@ -73,6 +75,7 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 ///   T_world_rig = T_world_body * T_body_rig.
 /// The kind of the file is found by its content:
 /// - YAML with T_body_rig, 4x4, from the rig's frame to the body's; other keys are ignored.
+/// - The result of easy_handeye with the eye on the hand: the body is the robot's effector.
 /// - A Kalibr camera chain: the body is the IMU, see `readCamchainImu`.
 /// - DSEC's cam_to_lidar.yaml: the body is the LiDAR, see `readDsecHandEye`.
 /// - TUM-VIE's mocap-imu-calibration*.json: the body is the marker, see `readTumVieHandEye`.

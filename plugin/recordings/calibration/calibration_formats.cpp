@@ -152,17 +152,69 @@ CameraModel readCameraInfo(const YamlEntry& root) {
   setSensorSize(root, "image_width", width, 1, model);
   setSensorSize(root, "image_height", width, root.number("image_height"), model);
 
-  const std::string distortion = root.text("distortion_model");
+  // OpenCV's files have no model; some of ROS call it camera_model.
+  const char* const key = root.has("distortion_model") ? "distortion_model" : "camera_model";
+  const std::string distortion = root.has(key) ? root.text(key) : "plumb_bob";
   if (distortion == "equidistant" || distortion == "fisheye") {
     model.distortion = DistortionModel::kEquidistant;
   } else if (distortion != "plumb_bob") {
-    throw root.failKey("distortion_model", inQuotes(distortion),
-                       "plumb_bob, equidistant or fisheye");
+    throw root.failKey(key, inQuotes(distortion), "plumb_bob, equidistant or fisheye");
   }
   model.coefficients =
       root.section("distortion_coefficients").numbers("data", 0, "a list of numbers");
   requireValid(root, model);
   return model;
+}
+
+CameraModel readMetavisionCamera(const YamlEntry& root) {
+  const std::vector<double> k = root.numbers("K", 9, "9, fx 0 cx 0 fy cy 0 0 1");
+  const std::vector<double> size = root.numbers("img_size", 2, "2, width height");
+  CameraModel model{0, 0, k[0], k[4], k[2], k[5], DistortionModel::kRadtan, {}};
+  setSensorSize(root, "img_size", size[0], size[1], model);
+  const std::string type = root.text("type");
+  if (type != "PINHOLE") throw root.failKey("type", inQuotes(type), "PINHOLE");
+  model.coefficients = root.numbers("D", 0, "a list of numbers");
+  requireValid(root, model);
+  return model;
+}
+
+Rig readDvCameras(const YamlEntry& root) {
+  Rig rig;
+  const std::size_t count = root.sizeOf("cameras");
+  for (std::size_t n = 0; n < count; ++n) {
+    const YamlEntry entry = root.item("cameras", n);
+    const std::vector<double> focal = entry.numbers("focalLength", 2, "2, fx fy");
+    const std::vector<double> center = entry.numbers("principalPoint", 2, "2, cx cy");
+    const std::vector<double> size = entry.numbers("resolution", 2, "2, width height");
+    CameraModel model{0, 0, focal[0], focal[1], center[0], center[1], DistortionModel::kRadtan, {}};
+    setSensorSize(entry, "resolution", size[0], size[1], model);
+    const std::string distortion = entry.text("distortionModel");
+    if (distortion == "equidistant") {
+      model.distortion = DistortionModel::kEquidistant;
+    } else if (distortion != "radialTangential") {
+      throw entry.failKey("distortionModel", inQuotes(distortion),
+                          "radialTangential or equidistant");
+    }
+    model.coefficients = entry.numbers("distortionCoefficients", 0, "a list of numbers");
+    requireValid(entry, model);
+    rig.cameras.push_back({model, entry.transform("transformationToC0"), 0});
+  }
+  return rig;
+}
+
+Rigid3 readEasyHandEye(const YamlEntry& root) {
+  if (root.has("parameters")) {
+    const YamlEntry parameters = root.section("parameters");
+    if (parameters.has("eye_on_hand") && parameters.text("eye_on_hand") != "true") {
+      throw parameters.failKey("eye_on_hand", inQuotes(parameters.text("eye_on_hand")),
+                               "true: a camera on the tracked body");
+    }
+  }
+  const YamlEntry t = root.section("transformation");
+  const Eigen::Quaterniond numbers(t.number("qw"), t.number("qx"), t.number("qy"), t.number("qz"));
+  const auto rotation = rotationNear(numbers);
+  if (!rotation) throw t.fail("qx qy qz qw: expected a quaternion of length 1");
+  return {*rotation, {t.number("x"), t.number("y"), t.number("z")}};
 }
 
 Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::path& file) {

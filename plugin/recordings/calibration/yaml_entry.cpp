@@ -52,6 +52,12 @@ Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const 
   const std::string expected =
       fmt::format("{}rows of {} numbers", rows == 0 ? "" : fmt::format("{} ", rows), columns);
   const YAML::Node list = find(key);
+  if (list.IsSequence() && rows != 0 && list.size() > 0 && list[0].IsScalar()) {
+    const std::vector<double> values =
+        numbersIn(list, key, static_cast<std::size_t>(rows * columns), expected.c_str());
+    return Eigen::Map<const Eigen::Matrix<double, -1, -1, Eigen::RowMajor>>(values.data(), rows,
+                                                                            columns);
+  }
   if (!list.IsSequence() || (rows != 0 && list.size() != static_cast<std::size_t>(rows))) {
     throw failNode(list, key, expected);
   }

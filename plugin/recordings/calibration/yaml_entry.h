@@ -28,7 +28,7 @@ class YamlEntry {
   /// @param expected the meaning of the numbers, for errors.
   std::vector<double> numbers(const char* key, std::size_t count, const char* expected) const;
   double number(const char* key) const;
-  /// Reads a list of rows.
+  /// Reads a list of rows, or, if their number is given, all numbers in one list, row by row.
   /// @param rows expected number of rows; 0: any.
   Eigen::MatrixXd matrix(const char* key, int rows, int columns) const;
   /// Reads a 3x3 matrix. It may have errors of 1e-3 (rounding); the nearest rotation is taken.
@@ -40,6 +40,7 @@ class YamlEntry {
   YamlEntry section(const char* key) const;
   /// Returns the keys and values of an item of a list; `index` is from 0.
   YamlEntry item(const char* key, std::size_t index) const;
+  std::size_t sizeOf(const char* key) const { return find(key).size(); }
 
   std::runtime_error failKey(const char* key, std::string_view found,
                              std::string_view expected) const;

@@ -47,6 +47,7 @@ struct Hdf5Layout {
   std::string index{};   ///< Data set: first event of each millisecond of t; empty: none.
   std::string offset{};  ///< Data set: added to t, in units of `time_unit_ns`; empty: none.
   std::optional<CameraSize> size{};  ///< Size of the sensor, if all recordings have it.
+  std::string order = std::string(kHdf5Columns);  ///< Of the columns of a matrix.
 
   /// Returns the data set that identifies a file with this layout.
   std::string signature() const { return events.empty() ? columns[0] : events; }
@@ -106,9 +107,10 @@ std::unique_ptr<EventStream> openHdf5Events(const std::shared_ptr<const Hdf5File
   for (std::size_t i = 0; i < layout.columns.size(); ++i) {
     const std::string& column = layout.columns[i];
     const auto of_column = rows ? rows : rows_of(column);
-    table.column(kHdf5Columns[i]) = rows && !column.empty()
-                                        ? Hdf5Rows::ofField(rows, column)
-                                        : Hdf5Rows::ofMatrix(of_column, rows ? i : 0);
+    table.column(kHdf5Columns[i]) =
+        rows && !column.empty()
+            ? Hdf5Rows::ofField(rows, column)
+            : Hdf5Rows::ofMatrix(of_column, rows ? layout.order.find(kHdf5Columns[i]) : 0);
     if (of_column->size() != table.column('x').rows->size()) {
       throw of_column->fail(fmt::format("{} numbers: expected {}, as many as {}{} has",
                                         of_column->size(), table.column('x').rows->size(), camera,
@@ -287,6 +289,12 @@ bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions&
   for (const Hdf5Layout& layout : hdf5Layouts()) {
     any = addCameras(file, layout, options, parts) || any;
   }
+  if (constexpr const char* kMatrix = "/events";
+      !any && !names && !options.columns.empty() && file->has(kMatrix)) {
+    Hdf5Layout matrix = {"--event-columns", {""}, kMatrix, {}};
+    matrix.order = orderOfOption(options.columns);
+    return addCameras(file, matrix, options, parts);
+  }
   if (any && names) throw file->fail("/" + (*names)[1], "no such data set (--event-columns)");
   return any;
 }
@@ -313,8 +321,8 @@ bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts&
   }
   throw std::runtime_error(
       fmt::format("{}: an HDF5 file without events or poses: expected {}others by "
-                  "--event-columns \"t=PATH x=PATH y=PATH p=PATH\", or poses, {} (MVSEC) or {} "
-                  "(M3ED)",
+                  "--event-columns \"t=PATH x=PATH y=PATH p=PATH\" (an N x 4 data set /events: "
+                  "\"t x y p\"), or poses, {} (MVSEC) or {} (M3ED)",
                   path.string(), expected, kPoses[0].matrices, kPoses[1].matrices));
 }
 

@@ -140,6 +140,8 @@ struct ReaderOptions {
   /// The unit of times in text events and NumPy arrays, and of floating-point times in HDF5: s, ms,
   /// us or ns. Empty: found from the values, else s.
   std::string time_unit;
+  /// The unit of times in text poses whose header names none. Empty: `time_unit` for whole numbers.
+  std::string pose_time_unit{};
   /// The size of all sensors, used if neither the recording nor a calibration has it.
   std::optional<CameraSize> sensor_size{};
   bool keep_originals = false;  ///< True if poses of a rawlog keep their originals: see PoseSample.

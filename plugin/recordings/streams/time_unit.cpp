@@ -52,13 +52,13 @@ std::optional<int> datedExponent(const TimeSample& sample) {
 /// Describes the likely unit: "probably us, where 1000 events take 0.01 s".
 std::string guessOf(const TimeSample& sample, const UsualRate& usual) {
   const std::optional<int> likely = likelyExponent(sample, usual);
-  if (!likely) return "expected decimal seconds, or --time-unit s, ms, us or ns";
+  if (!likely) return fmt::format("expected decimal seconds, or {} s, ms, us or ns", usual.option);
   const double seconds = (sample.latest - sample.earliest) * std::pow(10.0, *likely);
   const std::string unit = timeUnitOf(*likely);
   return fmt::format(
-      "probably {}, where {} {} take {:.2g} s: expected --time-unit {}, or the right one of s, ms, "
-      "us and ns",
-      unit, sample.count, usual.things, seconds, unit);
+      "probably {}, where {} {} take {:.2g} s: expected {} {}, or the right one of s, ms, us and "
+      "ns",
+      unit, sample.count, usual.things, seconds, usual.option, unit);
 }
 
 }  // namespace
@@ -134,15 +134,28 @@ TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
     return {*dated,
             Warning{"time-unit",
                     fmt::format("{}: the times are whole numbers without a unit; as {} they are of "
-                                "our years and their rate is usual (--time-unit {})",
-                                where, unit, unit)}};
+                                "our years and their rate is usual ({} {})",
+                                where, unit, usual.option, unit)}};
   }
   throw std::runtime_error(fmt::format("{}: all times are whole numbers, of an unknown unit: {}",
                                        where, guessOf(sample, usual)));
 }
 
+void requireSecondsOfPoses(const TimeSample& sample, const std::string& where) {
+  constexpr int kEnough = 10;
+  constexpr double kFarTooRare = 0.01;  // poses per second
+  if (sample.count < kEnough || sample.latest <= sample.earliest ||
+      rateOf(sample, 0) >= kFarTooRare) {
+    return;
+  }
+  throw std::runtime_error(fmt::format("{}: {} poses take {:.3g} of a unit that is not seconds: {}",
+                                       where, sample.count, sample.latest - sample.earliest,
+                                       guessOf(sample, kUsualPoseRate)));
+}
+
 int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
                      const std::string& where) {
+  if (!options.pose_time_unit.empty()) return timeExponentOf(options.pose_time_unit).value_or(0);
   const TimeUnit unit = findTimeUnit(options, sample, kUsualPoseRate, where);
   if (unit.warning) throw std::runtime_error(unit.warning->text);
   return unit.exponent;

@@ -115,6 +115,12 @@ struct TimeSample {
   double latest = 0;
 
   void add(double t, bool is_whole);
+  /// Adds a time as it was written. With an exponent, as NumPy writes it, the value tells whether
+  /// it is whole: 1.200012e+06.
+  void add(double t, std::string_view text) {
+    const bool exponent = text.find_first_of("eE") != std::string_view::npos;
+    add(t, exponent ? std::floor(t) == t : text.find('.') == std::string_view::npos);
+  }
   /// Adds a time. A number that is not finite is ignored.
   void add(double t);
 };
@@ -124,9 +130,10 @@ struct UsualRate {
   const char* things;
   double min;
   double max;
+  const char* option;
 };
-inline constexpr UsualRate kUsualEventRate = {"events", 1e3, 3e7};
-inline constexpr UsualRate kUsualPoseRate = {"poses", 5, 2000};
+inline constexpr UsualRate kUsualEventRate = {"events", 1e3, 3e7, "--time-unit"};
+inline constexpr UsualRate kUsualPoseRate = {"poses", 5, 2000, "--pose-time-unit"};
 
 struct TimeUnit {
   int exponent = 0;
@@ -144,7 +151,12 @@ struct TimeUnit {
 TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
                       const UsualRate& usual, const std::string& where);
 
-/// Finds the exponent for times of poses. A unit that only the values show is an error, too.
+/// @throws std::runtime_error naming the likely unit if poses with decimals are too rare for
+/// seconds.
+void requireSecondsOfPoses(const TimeSample& sample, const std::string& where);
+
+/// Finds the exponent for times of poses. Their option is `pose_time_unit`; `time_unit` holds for
+/// whole numbers. A unit that only the values show is an error, too.
 int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
                      const std::string& where);
 

@@ -62,6 +62,8 @@ bool takeNames(std::string_view line, EventColumns& columns) {
   return true;
 }
 
+}  // namespace
+
 std::string orderOfOption(const std::string& text) {
   std::string order;
   for (const std::string_view word : splitWords(text, " ,")) order += word;
@@ -70,6 +72,8 @@ std::string orderOfOption(const std::string& text) {
       "--event-columns {}: expected t, x, y and p, each once, and - for a column to ignore",
       inQuotes(text)));
 }
+
+namespace {
 
 /// Skips the lines before the first event. @return the rest of the text.
 std::string_view takeHeader(std::string_view text, EventColumns& columns, Header& header) {
@@ -139,7 +143,7 @@ TimeSample timesIn(const TextRows& rows, const EventColumns& columns) {
     if (row.size() != columns.order.size()) continue;
     const std::string_view text = row[t_column];
     const std::optional<double> t = parseFinite(text);
-    if (t) sample.add(*t, text.find_first_of(".eE") == std::string_view::npos);
+    if (t) sample.add(*t, text);
   }
   return sample;
 }

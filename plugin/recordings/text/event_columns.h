@@ -87,6 +87,10 @@ inline constexpr std::string_view kEventColumns = "txyp";
 using EventNames = std::array<std::string, 4>;
 bool hasAll(const EventNames& names);
 
+/// Returns the letters in `--event-columns "t x y p"`.
+/// @throws std::runtime_error unless they are t, x, y and p, each once, and - for ignored columns.
+std::string orderOfOption(const std::string& text);
+
 /// Returns the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`.
 /// @return std::nullopt if the option has no `=`.
 /// @throws std::runtime_error if the option does not name each column once.

@@ -157,13 +157,19 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
       throw std::runtime_error(
           fmt::format("{}:{}: {}", file.string(), lines[i].number, kPosesWithoutTimes));
     }
+    if (!columns.named && fields.size() != kPoseFields) {
+      throw std::runtime_error(fmt::format(
+          "{}:{}: {} fields: expected 8, t tx ty tz qx qy qz qw; name them in a header line",
+          file.string(), lines[i].number, fields.size()));
+    }
     if (fields.size() <= columns.column[0]) continue;
     const std::string_view t = fields[columns.column[0]];
-    if (const auto value = parseFinite(t)) {
-      sample.add(*value, t.find_first_of(".eE") == std::string_view::npos);
-    }
+    if (const auto value = parseFinite(t)) sample.add(*value, t);
   }
-  if (!sample.whole) return 0;  // the option is for times of events
+  if (!sample.whole && options.pose_time_unit.empty()) {  // `time_unit` is for whole numbers
+    requireSecondsOfPoses(sample, file.string());
+    return 0;
+  }
   if (columns.named && file.filename().string().find("mocap_data") != std::string::npos) return -6;
   return poseTimeExponent(options, sample, file.string());
 }
@@ -210,7 +216,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
 
 bool looksLikePoseLines(std::string_view beginning) {
   ReaderOptions options;
-  options.time_unit = "ns";  // any unit: it does not matter here
+  options.pose_time_unit = "ns";  // any unit: it does not matter here
   try {
     return !posesOf(beginning, {}, options).empty();
   } catch (const std::runtime_error&) {

@@ -104,6 +104,36 @@ TEST_F(CalibrationFile, MayBeTheCameraInfoOfRos) {
             read(fisheye).rig.cameras[0].model);
 }
 
+TEST_F(CalibrationFile, MayBeOfAnotherProgram) {
+  CameraModel expected{320, 180, 217.24, 217.34, 163.3, 82.8, DistortionModel::kRadtan, {}};
+  expected.coefficients = {-0.0675, 0.021, 0.0034, 0.0016, 0.0974};
+  const std::string body =
+      "image_width: 320\nimage_height: 180\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: "
+      "3\n"
+      "   dt: d\n   data: [ 217.24, 0., 163.3, 0., 217.34, 82.8, 0., 0., 1. ]\n"
+      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
+      "   data: [ -0.0675, 0.021, 0.0034, 0.0016, 0.0974 ]\n";
+  const std::string dv_camera =
+      R"({"name": "DVXplorer", "resolution": ["320", "180"], "principalPoint": ["163.3", "82.8"],
+          "focalLength": ["217.24", "217.34"], "distortionModel": "radialTangential",
+          "distortionCoefficients": ["-0.0675", "0.021", "0.0034", "0.0016", "0.0974"],
+          "transformationToC0": ["1", "0", "0", "X", "0", "1", "0", "0", "0", "0", "1", "0",
+                                 "0", "0", "0", "1"]})";
+  const std::string dv = R"({"version": "2.0", "cameras": [)" + replaced(dv_camera, "X", "0") +
+                         ", " + replaced(dv_camera, "X", "0.1") + "]}";
+  for (const std::string& text :
+       {"%YAML:1.0\n---\n" + body, "camera_model: plumb_bob\n" + body, dv,
+        std::string(R"({"type": "PINHOLE", "img_size": [320, 180],
+                        "K": [217.24, 0, 163.3, 0, 217.34, 82.8, 0, 0, 1],
+                        "D": [-0.0675, 0.021, 0.0034, 0.0016, 0.0974]})"),
+        std::string("217.24 217.34 163.3 82.8 -0.0675 0.021 0.0034 0.0016 0.0974\n320 180\n")}) {
+    EXPECT_EQ(read(text).rig.cameras.at(0).model, expected) << text;
+  }
+  EXPECT_EQ(read(dv).rig.cameras.at(1).T_rig_cam.translation, Eigen::Vector3d(0.1, 0, 0));
+  EXPECT_THAT(errorOfText(replaced(dv, "radialTangential", "fov")),
+              HasSubstr("distortionModel = 'fov': expected radialTangential or equidistant"));
+}
+
 TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
   mrpt::img::TStereoCamera stereo;
   stereo.leftCamera.ncols = 640;
@@ -354,6 +384,18 @@ TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
   EXPECT_THAT(errorOfText("cam0: {camera_model: pinhole}\n"),
               HasSubstr("hand_eye.yaml:1: cam0: T_cam_imu is missing"));
   EXPECT_THAT(errorOfText("cam0: {}\ncam2: {}\n"), HasSubstr("hand_eye.yaml: cam2 without cam1"));
+}
+
+TEST_F(HandEyeFile, OfEasyHandEyeIsThatOfACameraOnTheHand) {
+  const char* const text =
+      "parameters: {eye_on_hand: true}\n"
+      "transformation: {qw: 0, qx: 0, qy: 0, qz: 1, x: 0.05, y: 0.1, z: 0.2}\n";
+  EXPECT_LT((read(text) * Eigen::Vector3d(1, 2, 3) - Eigen::Vector3d(-0.95, -1.9, 3.2)).norm(),
+            1e-12);
+  EXPECT_THAT(errorOfText(replaced(text, "true", "false")),
+              HasSubstr("parameters: eye_on_hand = 'false': expected true: a camera on the"));
+  EXPECT_THAT(errorOf([&] { readHandEye(folder() / "T.npz"); }),
+              HasSubstr("T.npz: a NumPy file: expected YAML"));
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {

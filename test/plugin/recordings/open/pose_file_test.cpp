@@ -95,10 +95,22 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
   std::string lines;
   for (int i = 0; i < 12; ++i) lines += std::to_string(928'218 + i) + " 1 2 3 0 0 0 1\n";
   EXPECT_THAT(errorOfFile("small.txt", lines),
-              AllOf(HasSubstr("small.txt: all times are whole"), HasSubstr("--time-unit ms")));
+              AllOf(HasSubstr("small.txt: all times are whole"), HasSubstr("--pose-time-unit ms")));
   ReaderOptions options;
   options.time_unit = "us";
   EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000);
+  options.pose_time_unit = "ms";  // of the poses alone
+  EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000'000);
+  options.pose_time_unit.clear();
+  // Nanoseconds with decimals, and numbers of more columns than a pose has.
+  lines.clear();
+  for (int i = 0; i < 12; ++i) lines += std::to_string(1'200 + i) + "000000.0 1 2 3 0 0 0 1\n";
+  EXPECT_THAT(errorOfFile("decimals.txt", lines), HasSubstr("--pose-time-unit ns"));
+  ReaderOptions nanoseconds;
+  nanoseconds.pose_time_unit = "ns";
+  EXPECT_EQ(readPoses(folder() / "decimals.txt", nanoseconds)[1].t_ns, 1'201'000'000);
+  EXPECT_THAT(errorOfFile("numbered.txt", "0 7 1 2 3 0 0 0 1\n"),
+              HasSubstr("numbered.txt:1: 9 fields: expected 8, t tx ty tz qx qy qz qw; name them"));
   // The unit is found from the first 100 poses; all poses are read.
   for (const int count : {99, 100}) {
     lines.clear();
