@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <iomanip>
+#include <locale>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -410,6 +411,7 @@ class PoseCheck {
   }
   std::string seen() const {
     std::ostringstream text;
+    text.imbue(std::locale::classic());
     text << std::setprecision(2) << seenS() << " s of "
          << (severalCameras() ? "the cameras" : "one camera");
     return text.str();

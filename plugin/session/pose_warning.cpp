@@ -137,7 +137,8 @@ Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
   if (finding.mistake == PoseMistake::kUnknown && !finding.alternatives.empty()) {
     std::string names;
     for (const PoseMistake mistake : finding.alternatives) {
-      names += fmt::format("{}{}", names.empty() ? "" : ", ", nameIn(kNames, mistake));
+      const std::string name(nameIn(kNames, mistake));  // two mistakes share a name
+      if (names.find(name) == std::string::npos) names += (names.empty() ? "" : ", ") + name;
     }
     warning.text = fmt::format(
         "the events are up to {} with other poses or pixels, but these data do not tell which of "

@@ -157,7 +157,7 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
       throw std::runtime_error(
           fmt::format("{}:{}: {}", file.string(), lines[i].number, kPosesWithoutTimes));
     }
-    if (!columns.named && fields.size() != kPoseFields) {
+    if (!columns.named && fields.size() > kPoseFields) {
       throw std::runtime_error(fmt::format(
           "{}:{}: {} fields: expected 8, t tx ty tz qx qy qz qw; name them in a header line",
           file.string(), lines[i].number, fields.size()));

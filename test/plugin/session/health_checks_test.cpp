@@ -639,11 +639,14 @@ TEST(PoseWarning, SaysHowDepthsDiffer) {
 TEST(PoseWarning, SaysTwoMistakesOfOneNameApart) {
   PoseFinding finding;
   finding.mistake = PoseMistake::kCamerasSwapped;
-  finding.alternatives = {PoseMistake::kStereoInverted, PoseMistake::kInverted};
+  finding.alternatives = {PoseMistake::kCamerasSwapped, PoseMistake::kStereoInverted};
   EXPECT_THAT(poseWarning(finding, Rig{}).text,
               AllOf(HasSubstr("with the events of cameras 0 and 1 exchanged"),
-                    HasSubstr("; or the transform between cameras 0 and 1 is inverted, which"),
-                    HasSubstr("; or it is poses-inverted, which")));
+                    HasSubstr("; or the transform between cameras 0 and 1 is inverted, which")));
+  finding.mistake = PoseMistake::kUnknown;
+  finding.alternatives.push_back(PoseMistake::kAxes);
+  EXPECT_EQ(poseWarning(finding, Rig{}).name, "poses-unexplained");
+  EXPECT_THAT(poseWarning(finding, Rig{}).text, HasSubstr("(cameras-swapped, axis-convention)"));
 }
 
 }  // namespace

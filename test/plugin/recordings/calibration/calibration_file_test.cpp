@@ -114,7 +114,7 @@ TEST_F(CalibrationFile, MayBeOfAnotherProgram) {
       "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
       "   data: [ -0.0675, 0.021, 0.0034, 0.0016, 0.0974 ]\n";
   const std::string dv_camera =
-      R"({"name": "DVXplorer", "resolution": ["320", "180"], "principalPoint": ["163.3", "82.8"],
+      R"({"name": "DV", "resolution": ["320", "180"], "principalPoint": ["163.3", "82.8"],
           "focalLength": ["217.24", "217.34"], "distortionModel": "radialTangential",
           "distortionCoefficients": ["-0.0675", "0.021", "0.0034", "0.0016", "0.0974"],
           "transformationToC0": ["1", "0", "0", "X", "0", "1", "0", "0", "0", "0", "1", "0",
