@@ -182,11 +182,11 @@ class PoseCheck {
             [&](const SamplePiece& piece) { return sharpness.of(piece, piece.trajectory); });
   }
 
-  /// Returns the gains of a time shift of some pieces, without pieces that lack poses.
-  Gains gainsOfShift(double shift_s, std::size_t begin, std::size_t end) {
+  /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
+  Gains gainsOfShift(double shift_s, std::size_t count) {
     Gains gains;
     const std::int64_t shift_ns = durationFromSeconds(shift_s);
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       const SamplePiece& piece = pieces_[i];
       const std::vector<StampedPose>& poses = piece.trajectory.poses();
       if (poses.front().t_ns > piece.window.t0_ns + shift_ns ||
@@ -232,9 +232,9 @@ class PoseCheck {
     for (double s = kTimeStepS; s <= kMaxTimeShiftS; s += (s < 0.2 ? 1 : 2) * kTimeStepS) {
       shifts_s.push_back(s);
     }
-    const double best_s = bestShift(shifts_s, [&](double s) { return gainsOfShift(s, 0, half()); });
+    const double best_s = bestShift(shifts_s, [&](double s) { return gainsOfShift(s, half()); });
     const auto gainsOf = [&](double s) {
-      Gains gains = gainsOfShift(s, 0, pieces_.size());
+      Gains gains = gainsOfShift(s, pieces_.size());
       if (4 * gains.logs.size() < 3 * pieces_.size()) gains.logs.clear();
       return gains;
     };
@@ -252,7 +252,7 @@ class PoseCheck {
     candidate.is_peak = drop > 2 * kMinDrop && ((!open && seenS() >= kMinSeenOfOneS) ||
                                                 candidate.gains.mean() > kMinShortShiftGain);
     clock_is_known_ = !open && drop > kMinDrop && std::abs(best_s) < kKnownClockS;
-    if (candidate.gains.logs.empty()) candidate.gains = gainsOfShift(best_s, 0, half());
+    if (candidate.gains.logs.empty()) candidate.gains = gainsOfShift(best_s, half());
     best_shift_gain_ = candidate.gains.mean();
     candidates_.push_back(std::move(candidate));
   }
