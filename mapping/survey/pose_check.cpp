@@ -337,9 +337,11 @@ class PoseCheck {
   /// Compares pixels that are moved, if the events leave a side of a sensor empty.
   void compareAreas() {
     const CameraModel& first = rig_.cameras[0].model;
-    const bool binned = 2 * emptyLines(0, 0, true) >= first.width - 2 &&
-                        2 * emptyLines(0, 1, true) >= first.height - 2;
-    if (binned) area_is_known_ = false;
+    if (2 * emptyLines(0, 0, true) >= first.width - 2 &&
+        2 * emptyLines(0, 1, true) >= first.height - 2) {
+      area_is_known_ = false;  // binned, probably: no offset explains it
+      return;
+    }
     for (const int axis : {0, 1}) {
       for (const bool at_end : {false, true}) {
         PoseFinding finding{PoseMistake::kPixels};
@@ -350,7 +352,7 @@ class PoseCheck {
           finding.pixels.offset_px.emplace_back(0, 0);
           finding.pixels.offset_px[c][axis] = at_end ? lines : -lines;
         }
-        if (most == 0 || binned) continue;
+        if (most == 0) continue;
         // The view of one camera with an empty side shows too little of a motion.
         area_is_known_ =
             comparePixels(finding).mean() < kMaxOtherPixels && area_is_known_ && severalCameras();
