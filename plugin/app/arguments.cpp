@@ -192,7 +192,7 @@ void addSource(CLI::App& command, RecordingSource& source) {
   command
       .add_option("--topics", source.reader.topics,
                   "Topics of a bag, or streams of a file, to read: events, one for each camera, "
-                  "and poses (default: found by their type)")
+                  "and poses, or \"/tf:world->body\" (default: found by their type)")
       ->type_name("TOPIC[,TOPIC...]")
       ->delimiter(',')
       ->allow_extra_args(false);

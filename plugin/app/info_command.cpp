@@ -100,6 +100,15 @@ void print(const RecordingInfo& info) {
   fmt::print("{} observations\n", info.observations);
   printCameras(info.statistics);
   printPoses(info.statistics);
+  for (const RecordedTopic& topic : info.counts.topics) {
+    fmt::print("topic {} ({}): {} messages", topic.name, topic.type, topic.messages);
+    if (topic.from_ns > topic.until_ns) {
+      fmt::print("\n");
+    } else {
+      fmt::print(" between {} s and {} s\n", formatSeconds(topic.from_ns),
+                 formatSeconds(topic.until_ns));
+    }
+  }
   for (const auto& [name, count] : info.others) fmt::print("{}: {} observations\n", name, count);
   if (info.counts.sorted_events > 0) {
     fmt::print("{} events out of order by up to 10 ms\n", info.counts.sorted_events);

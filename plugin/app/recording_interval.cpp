@@ -31,6 +31,7 @@ std::int64_t RecordingTimes::start() {
   events.format = source_.format;
   events.calibration = source_.calibration;
   events.setup = source_.setup;
+  events.cameras = source_.cameras;
   events.reader = source_.reader;
   events.skip_bad_events = source_.skip_bad_events;
   events.complete = false;

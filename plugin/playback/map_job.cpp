@@ -43,6 +43,7 @@ RecordingSource MapJob::sourceNow() const {
   now.calibration = options.rig.calibration;
   now.hand_eye = options.rig.hand_eye;
   now.setup = options.rig.setup;
+  now.cameras = options.mapper.cameras;
   now.time_offsets_ns = options.rig.time_offsets_ns;
   now.override_rig = false;  // the mapping applies the options
   PosePerturbationOptions& perturbation = now.faults.perturbation;
@@ -204,12 +205,14 @@ class MapSteps {
   [[noreturn]] void rethrow(int written) const;
 
  private:
+  void takeCalibrationOf(std::size_t count);
   std::unique_ptr<Recording> firstLook();
   std::optional<double> sequenceMaximum();
   std::string stays() const;
   void warnOfNew();
 
   std::size_t reported_warnings_ = 0;
+  std::vector<int> calibrated_;  // the given `[rig] cameras`, see takeCalibrationOf
   std::optional<UserError> write_error_;
   const double start_cpu_s_ = processSeconds();
   std::chrono::steady_clock::time_point began_;
@@ -240,11 +243,23 @@ void MapSteps::begin() {
                  job.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure, namesOf(all));
 }
 
+/// If the calibration has more cameras than the recording, leaves those that `[rig] cameras` names:
+/// they are all cameras of the recording.
+void MapSteps::takeCalibrationOf(std::size_t count) {
+  RigSetup setup = options.rig.setup ? *options.rig.setup : RigSetup();
+  if (!setup.calibration || setup.calibration->rig.cameras.size() <= count) return;
+  setup.calibration = setup.calibration->of(count, options.mapper.cameras);
+  options.rig.setup = std::make_shared<RigSetup>(std::move(setup));
+  calibrated_ = std::exchange(options.mapper.cameras, {});
+  first.statistics = RecordingStatistics(statisticsOptions(options));
+}
+
 /// Chooses the automatic options, and warns of poses that do not explain the events.
 /// @return the recording again, if its events fit into `[live] max_queue_mb`; otherwise null.
 std::unique_ptr<Recording> MapSteps::firstLook() {
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
+  takeCalibrationOf(held->read().rig().cameras.size());
   FirstLook look(options);
   Progress progress("first look", job.verbosity);
   std::exception_ptr damage;  // the mapping reports it
@@ -333,6 +348,7 @@ void MapSteps::write(const std::function<void()>& file) {
 
 void MapSteps::describe(MappingRun& run, bool stopped) {
   run.describe(report, stopped);
+  if (!calibrated_.empty()) report.options.mapper.cameras = calibrated_;
   report.recording = namesOf(job.source);
   report.faults = job.sourceNow().faults;
   const std::string calibration = options.rig.calibration.string();

@@ -70,6 +70,7 @@ Json asJson(const PoseSourceId& source, const PoseStatistics& statistics, bool u
 RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>& progress) {
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
+  source.reader.lists_topics = true;
   const std::unique_ptr<Recording> recording = openRecording(source);
   RecordingInfo info;
   FirstLook look(defaultOptions());
@@ -103,6 +104,14 @@ std::string infoJson(const RecordingInfo& info) {
   }
   json["events_before_poses"] = info.statistics.eventsBeforePoses();
   json["events_after_poses"] = info.statistics.eventsAfterPoses();
+  json["topics"] = Json::array();
+  for (const RecordedTopic& topic : info.counts.topics) {
+    Json& added = json["topics"].emplace_back(Json{{"name", topic.name}, {"type", topic.type}});
+    added["messages"] = topic.messages;
+    if (topic.from_ns > topic.until_ns) continue;
+    added["from_ns"] = topic.from_ns;
+    added["until_ns"] = topic.until_ns;
+  }
   json["others"] = info.others;
   json["sorted_events"] = info.counts.sorted_events;
   json["true_depth_maps"] = info.true_depth_maps;

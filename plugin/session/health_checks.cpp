@@ -48,8 +48,10 @@ std::string clockGuess(const TimeSpan& events, const TimeSpan& poses) {
       return fmt::format("they fit if the events' times are in {}: --time-unit {}", unit, unit);
     }
     if (fitsWith(1 / factor, events, poses)) {
-      return fmt::format("they fit if the poses' times are in {}: a header names it, t_{} tx …",
-                         unit, unit);
+      return fmt::format(
+          "they fit if the poses' times are in {0}: --pose-time-unit {0}; or the events' times are "
+          "in a larger unit than --time-unit says",
+          unit);
     }
   }
   return "have they one clock and one unit?";

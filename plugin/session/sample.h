@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "mapping/base/text.h"
 #include "mapping/events/event.h"
 #include "mapping/geometry/rig.h"
+#include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/session/pose_source_selector.h"
 
@@ -75,14 +77,29 @@ std::int64_t nearestTick(std::int64_t t_ns);
 /// text, as a rawlog and through a host.
 Rigid3 roundedPose(const Rigid3& T_a_b);
 
+/// A topic of a bag. Its messages were recorded between two times: those of the bag's chunks.
+struct RecordedTopic {
+  std::string name;  ///< "/davis/left/events"
+  std::string type;  ///< "dvs_msgs/EventArray", also if ROS 2 has "dvs_msgs/msg/EventArray".
+  std::uint64_t messages = 0;  ///< 0: the index does not have their number.
+  std::int64_t from_ns = kEndOfTimeNs, until_ns = -kEndOfTimeNs;
+
+  void add(std::uint64_t more, std::int64_t more_from_ns, std::int64_t more_until_ns) {
+    messages += more;
+    from_ns = std::min(from_ns, more_from_ns);
+    until_ns = std::max(until_ns, more_until_ns);
+  }
+};
+
 /// Counts of irregular data in a recording that could be read.
 struct RecordingCounts {
-  std::uint64_t sorted_events = 0;   ///< Events that came up to 10 ms after a newer event.
-  std::uint64_t lost_packets = 0;    ///< Missing packets, from the recording's packet numbers.
-  std::uint64_t undated_events = 0;  ///< Events left out: see `EventStream::undatedEvents`.
-  std::uint64_t skipped_events = 0;  ///< Bad events, left out: see `BadEvents`.
-  std::string first_skipped;         ///< Error of the first skipped event.
-  std::vector<Warning> warnings;     ///< Warnings of the readers: see `EventStream::warnings`.
+  std::uint64_t sorted_events = 0;    ///< Events that came up to 10 ms after a newer event.
+  std::uint64_t lost_packets = 0;     ///< Missing packets, from the recording's packet numbers.
+  std::uint64_t undated_events = 0;   ///< Events left out: see `EventStream::undatedEvents`.
+  std::uint64_t skipped_events = 0;   ///< Bad events, left out: see `BadEvents`.
+  std::string first_skipped;          ///< Error of the first skipped event.
+  std::vector<Warning> warnings;      ///< Warnings of the readers: see `EventStream::warnings`.
+  std::vector<RecordedTopic> topics;  ///< Topics of a bag, if they were asked for.
   /// Times of the events nearest to the time limits of reading, on the clock of the poses.
   std::optional<std::int64_t> nearest_before_ns, nearest_after_ns;
 };

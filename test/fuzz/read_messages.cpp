@@ -23,7 +23,8 @@ constexpr const char* kTypes[] = {
     "dvs_msgs/EventArray",       "event_camera_msgs/EventPacket",
     "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped",
     "nav_msgs/Odometry",         "geometry_msgs/TransformStamped",
-    "sensor_msgs/CameraInfo",
+    "sensor_msgs/CameraInfo",    "nav_msgs/Path",
+    "tf2_msgs/TFMessage",
 };
 
 /// Messages in memory, recorded 10 ms apart.
@@ -70,7 +71,9 @@ void decodeAll(Messages& bag, efm::RosType type) {
     // The caller of the decoders knows the file's name.
     efm::fuzz::readOrReject("", [&] {
       if (efm::hasPoses(type)) {
-        efm::decodePose(message, type);
+        efm::decodePoses(message, type);
+      } else if (type == efm::RosType::kTransforms) {
+        efm::decodeTransforms(message);
       } else {
         efm::decodeCameraInfo(message);
       }

@@ -17,6 +17,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"
 #include "plugin/recordings/bags/bag_source.h"
+#include "plugin/recordings/bags/frame_tree.h"
 #include "plugin/recordings/bags/mcap_records.h"
 #include "plugin/recordings/bags/ros_messages.h"
 
@@ -103,6 +104,7 @@ std::vector<std::shared_ptr<BagSource>> openBagFiles(const fs::path& source) {
 /// A topic of the recording, in all bags that have it.
 struct RosTopic {
   std::string name;
+  std::string type_name;
   RosType type = RosType::kOther;
   std::vector<BagTopicPart> parts;  // in time order
 };
@@ -135,18 +137,17 @@ bool naturallyBefore(std::string_view a, std::string_view b) {
   return a.size() < b.size();
 }
 
-/// Returns the topics of known types in all bags, in the natural order of their names.
+/// Returns the topics in all bags, in the natural order of their names.
 RosTopics topicsOf(const std::vector<std::shared_ptr<BagSource>>& bags) {
   RosTopics topics;
   for (const auto& bag : bags) {
     for (std::size_t i = 0; i < bag->topics().size(); ++i) {
       const BagTopic& topic = bag->topics()[i];
       const RosType type = rosTypeOf(topic.type);
-      if (type == RosType::kOther) continue;
       auto found = std::find_if(topics.begin(), topics.end(), [&](const RosTopic& other) {
-        return other.name == topic.name && other.type == type;
+        return other.name == topic.name && other.type_name == topic.type;
       });
-      if (found == topics.end()) found = topics.insert(found, {topic.name, type, {}});
+      if (found == topics.end()) found = topics.insert(found, {topic.name, topic.type, type, {}});
       found->parts.push_back({bag, i});
     }
   }
@@ -199,6 +200,19 @@ std::string namesOf(const RosTopics& topics) {
   return names.empty() ? "none" : names;
 }
 
+/// Returns the messages of a topic in all bags.
+RecordedTopic recorded(const RosTopic& topic) {
+  RecordedTopic all = {topic.name, topic.type_name};
+  for (const BagTopicPart& part : topic.parts) {
+    const RecordedTopic& in_bag = part.bag->topics()[part.topic];
+    all.add(in_bag.messages, in_bag.from_ns, in_bag.until_ns);
+  }
+  return all;
+}
+
+/// Returns the topic in the value of an option: "/tf" in "/tf:world->body".
+std::string topicIn(const std::string& option) { return option.substr(0, option.find(':')); }
+
 /// Returns the topics of a kind that the options name; all of this kind if the options name none.
 template <typename IsKind>
 RosTopics chosen(const RosTopics& topics, const ReaderOptions& options, const IsKind& is_kind) {
@@ -215,13 +229,15 @@ RosTopics chosen(const RosTopics& topics, const ReaderOptions& options, const Is
 
 void requireTopics(const RosTopics& topics, const ReaderOptions& options,
                    const std::filesystem::path& file) {
+  const RosTopics known = chosen(topics, {}, [](RosType type) { return type != RosType::kOther; });
   for (const std::string& name : options.topics) {
-    if (std::any_of(topics.begin(), topics.end(),
-                    [&](const RosTopic& topic) { return topic.name == name; })) {
+    if (std::any_of(known.begin(), known.end(), [&](const RosTopic& topic) {
+          return topic.name == (topic.type == RosType::kTransforms ? topicIn(name) : name);
+        })) {
       continue;
     }
     throw std::runtime_error(fmt::format("{}: no topic {} with events or poses: expected {}",
-                                         file.string(), name, namesOf(topics)));
+                                         file.string(), name, namesOf(known)));
   }
 }
 
@@ -242,23 +258,103 @@ bool isTrigger(const RosTopic& topic) {
 
 std::string beforeThe(const std::string& damage) { return " before the damage (" + damage + ")"; }
 
-void addPoses(const RosTopics& all, RecordingParts& parts) {
-  RosTopics topics = all;
-  if (topics.size() > 1) {
-    topics.erase(
-        std::remove_if(topics.begin(), topics.end(),
-                       [](const RosTopic& topic) { return topic.type == RosType::kOdometry; }),
-        topics.end());
-    if (topics.empty()) topics = all;
+/// Reads the transforms between frames. @param most number of messages of each topic to read.
+FrameTree readFrames(const RosTopics& topics, std::int64_t most, std::string& damage) {
+  FrameTree tree;
+  for (const RosTopic& topic : topics) {
+    if (topic.type != RosType::kTransforms) continue;
+    std::int64_t count = 0;
+    const std::string ended = forMessages(topic, [&](const BagMessage& message) {
+      for (const FrameTransform& transform : decodeTransforms(message)) tree.add(transform);
+      return ++count < most;
+    });
+    if (damage.empty()) damage = ended;
+  }
+  return tree;
+}
+
+/// Returns the topic with the most messages per second of those that cover the events.
+/// @return null if another one is as dense, within 10 %.
+const RosTopic* densest(const RosTopics& candidates, const RosTopics& cameras) {
+  constexpr double kAlike = 0.9;
+  RecordedTopic events;
+  for (const RosTopic& camera : cameras) {
+    const RecordedTopic of_camera = recorded(camera);
+    events.add(0, of_camera.from_ns, of_camera.until_ns);
+  }
+  if (cameras.empty()) events.add(0, -kEndOfTimeNs, kEndOfTimeNs);
+  struct Rated {
+    const RosTopic* topic;
+    double covered_s, per_second;
+  };
+  std::vector<Rated> rated;
+  double most_s = 0;
+  for (const RosTopic& topic : candidates) {
+    const RecordedTopic poses = recorded(topic);
+    const double weight = topic.type == RosType::kOdometry ? 0.5 : 1;  // odometry drifts
+    const double seconds = std::max(secondsBetween(poses.from_ns, poses.until_ns), 1e-9);
+    rated.push_back({&topic,
+                     std::max(secondsBetween(std::max(poses.from_ns, events.from_ns),
+                                             std::min(poses.until_ns, events.until_ns)),
+                              0.0),
+                     weight * static_cast<double>(poses.messages) / seconds});
+    most_s = std::max(most_s, rated.back().covered_s);
+  }
+  rated.erase(std::remove_if(rated.begin(), rated.end(),
+                             [&](const Rated& topic) { return topic.covered_s < kAlike * most_s; }),
+              rated.end());
+  std::stable_sort(rated.begin(), rated.end(),
+                   [](const Rated& a, const Rated& b) { return a.per_second > b.per_second; });
+  const bool alike = rated.size() > 1 && rated[1].per_second >= kAlike * rated[0].per_second;
+  return rated.empty() || alike ? nullptr : rated[0].topic;
+}
+
+/// @param candidates topics with poses. @param cameras topics with events.
+void addPoses(const RosTopics& topics, const RosTopics& candidates, const RosTopics& cameras,
+              const ReaderOptions& options, RecordingParts& parts) {
+  constexpr std::int64_t kFirst = 1000;  // messages that name the frames
+  std::string transforms;                // the name of a topic
+  for (const RosTopic& topic : topics) {
+    if (topic.type != RosType::kTransforms) continue;
+    if (transforms.empty()) transforms = topic.name;
+    for (const std::string& name : options.topics) {
+      if (topicIn(name) != topic.name) continue;
+      const std::string frames = name.substr(std::min(topic.name.size() + 1, name.size()));
+      try {
+        parts.poses = readFrames(topics, kEndOfTimeNs, parts.poses_damage).posesOf(frames);
+      } catch (const std::runtime_error& error) {
+        throw std::runtime_error(fmt::format("--topics {}: {}", name, error.what()));
+      }
+      return;
+    }
   }
   parts.expected_poses = "messages with poses";
-  if (topics.size() > 1) {
-    parts.expected_poses = fmt::format("the choice of one by --topics, of {}", namesOf(topics));
+  if (candidates.empty()) {
+    if (transforms.empty()) return;
+    std::string ignored;
+    parts.expected_poses +=
+        fmt::format("; or those of a frame, --topics \"{}:PARENT->CHILD\", of {}", transforms,
+                    readFrames(topics, kFirst, ignored).names());
+    parts.warnings.push_back({"pose-topic", "no poses: expected " + parts.expected_poses});
     return;
   }
-  if (topics.empty()) return;
-  parts.poses_damage = forMessages(topics.front(), [&](const BagMessage& message) {
-    parts.poses.push_back(decodePose(message, topics.front().type));
+  const RosTopic* topic = &candidates.front();
+  if (candidates.size() > 1) {
+    topic = densest(candidates, cameras);
+    const std::string all = namesOf(candidates);
+    if (topic == nullptr) parts.expected_poses = "the choice of one by --topics, of " + all;
+    parts.warnings.push_back(
+        {"pose-topic",
+         topic == nullptr
+             ? "no poses: expected " + parts.expected_poses
+             : fmt::format("the poses are those of {}, the densest topic that covers the events; "
+                           "--topics chooses one, of {}",
+                           topic->name, all)});
+    if (topic == nullptr) return;
+  }
+  parts.poses_damage = forMessages(*topic, [&](const BagMessage& message) {
+    if (topic->type == RosType::kPath) parts.poses.clear();  // each path has all poses so far
+    for (const StampedPose& pose : decodePoses(message, topic->type)) parts.poses.push_back(pose);
     return true;
   });
   if (!parts.poses_damage.empty()) parts.expected_poses += beforeThe(parts.poses_damage);
@@ -326,7 +422,14 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
   std::vector<std::vector<BagTopicPart>> camera_parts;
   for (const RosTopic& camera : cameras) camera_parts.push_back(camera.parts);
   parts.cameras = openBagEvents(camera_parts);
-  addPoses(chosen(topics, options, hasPoses), parts);
+  const RosTopics with_poses = chosen(topics, options, hasPoses);
+  for (const auto& bag : bags) {
+    if (options.lists_topics || with_poses.size() > 1) bag->countMessages();
+  }
+  if (options.lists_topics) {
+    std::transform(topics.begin(), topics.end(), std::back_inserter(parts.topics), recorded);
+  }
+  if (!options.leaves_out_poses) addPoses(topics, with_poses, cameras, options, parts);
   addCalibration(topics, cameras, parts);
   return parts;
 }

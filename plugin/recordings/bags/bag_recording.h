@@ -12,12 +12,16 @@ namespace efm {
 /// Several files are one recording: a topic continues from one file to the next.
 ///
 /// Topics are found by their type (see RosType). Cameras are the topics with events, in the natural
-/// order of their names, left before right: /cam2 before /cam10. Poses come from the only topic
-/// with poses. If there are several topics, poses come from the only topic of geometry_msgs
-/// (nav_msgs/Odometry is mostly an additional estimate). If several topics remain, there are no
-/// poses, and the error about missing poses names the topics. ReaderOptions::topics replaces this
-/// choice. Its event topics are the cameras, in this order; its pose topic gives the poses. If it
-/// has no topic of a kind, topics of this kind are found by type.
+/// order of their names, left before right: /cam2 before /cam10. Poses come from the densest topic
+/// with poses that covers the events, by the times at which messages were recorded. Odometry
+/// drifts: its density counts by half. If there are several topics, the warning `pose-topic` names
+/// them. If two are alike in density and time, within 10 %, there are no poses.
+/// ReaderOptions::topics replaces this choice. Its event topics are the cameras, in this order; its
+/// pose topic gives the poses. If it has no topic of a kind, topics of this kind are found by type.
+///
+/// "/tf:world->body" in ReaderOptions::topics gives the poses of a frame from messages of
+/// tf2_msgs/TFMessage: one moving transform on the way from `world` to `body`, and constant ones
+/// (/tf_static) before and after it.
 ///
 /// A camera's calibration is sensor_msgs/CameraInfo in the namespace of its events
 /// (/davis/left/camera_info for /davis/left/events). It has no extrinsics, so it is used only if

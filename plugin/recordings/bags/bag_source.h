@@ -11,12 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "plugin/recordings/streams/recording_parts.h"
+
 namespace efm {
 
-struct BagTopic {
-  std::string name;  ///< "/davis/left/events"
-  std::string type;  ///< "dvs_msgs/EventArray", also if ROS 2 has "dvs_msgs/msg/EventArray".
-};
+using BagTopic = RecordedTopic;
 
 /// A message as a bag stores it: in ROS 1's serialisation (little-endian, packed), or in CDR with
 /// its header of 4 bytes.
@@ -50,6 +49,9 @@ class BagSource {
   /// bag's index.
   virtual BagCursor messages(std::size_t topic, std::int64_t from_log_ns) = 0;
 
+  /// Counts the messages of the topics, if opening the bag did not.
+  virtual void countMessages() {}
+
  protected:
   /// @return the topic's index. Topics of the same name and type have the same index.
   std::size_t addTopic(const BagTopic& topic) {
@@ -61,6 +63,7 @@ class BagSource {
     if (found == topics_.end()) topics_.push_back(topic);
     return index;
   }
+  BagTopic& topic(std::size_t index) { return topics_[index]; }
   void setLogTimes(std::int64_t first_ns, std::int64_t last_ns) {
     first_log_ns_ = first_ns;
     last_log_ns_ = last_ns;

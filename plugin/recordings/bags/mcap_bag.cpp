@@ -60,7 +60,7 @@ class McapBag : public ChunkedBag {
   void scanFile();
   ChunkMessages messagesIn(ChunkBytes bytes);
   void takeSchemaOrChannel(McapRecord& record);
-  BagChunk chunkOfIndex(ByteReader content) const;
+  BagChunk chunkOfIndex(ByteReader content);
 
   struct Channel {
     std::size_t topic;
@@ -99,6 +99,7 @@ bool McapBag::readSummary() {
   });
   // Chunks refer to channels, which may come after them.
   std::vector<std::pair<std::uint64_t, ByteReader>> indexes;
+  ByteReader counts = readerOf({});  // of each channel's messages
   bool has_channels = false;
   ByteReader records(section.get(), footer - summary);
   while (records.remaining() > 0) {
@@ -106,6 +107,9 @@ bool McapBag::readSummary() {
     located(at, [&] {
       McapRecord record = takeMcapRecord(records);
       if (record.op == McapOp::kChunkIndex) indexes.emplace_back(at, record.content);
+      if (record.op == McapOp::kStatistics) {
+        counts = readerOf(takeMcapFields<McapStatistics>(record.content).channel_messages);
+      }
       has_channels = has_channels || record.op == McapOp::kChannel;
       takeSchemaOrChannel(record);
     });
@@ -125,10 +129,15 @@ bool McapBag::readSummary() {
                                              before.size, chunks[i].offset));
   }
   setChunks(std::move(chunks));
+  while (counts.remaining() >= sizeof(std::uint16_t) + sizeof(std::uint64_t)) {
+    const auto channel = channels_.find(counts.number<std::uint16_t>());
+    const auto count = counts.number<std::uint64_t>();
+    if (channel != channels_.end()) topic(channel->second.topic).messages += count;
+  }
   return true;
 }
 
-BagChunk McapBag::chunkOfIndex(ByteReader content) const {
+BagChunk McapBag::chunkOfIndex(ByteReader content) {
   const auto index = takeMcapFields<McapChunkIndex>(content);
   BagChunk chunk;
   chunk.first_log_ns = logTime(index.first_log_ns);
@@ -140,7 +149,9 @@ BagChunk McapBag::chunkOfIndex(ByteReader content) const {
   while (indexes.remaining() > 0) {
     const auto channel = channels_.find(indexes.number<std::uint16_t>());
     indexes.number<std::uint64_t>();
-    if (channel != channels_.end()) chunk.topics |= topicBit(channel->second.topic);
+    if (channel == channels_.end()) continue;
+    chunk.topics |= topicBit(channel->second.topic);
+    topic(channel->second.topic).add(0, chunk.first_log_ns, chunk.last_log_ns);
   }
   return chunk;
 }
@@ -177,6 +188,7 @@ void McapBag::scanFile() {
         chunk.first_log_ns = first ? message.log_ns : std::min(chunk.first_log_ns, message.log_ns);
         chunk.last_log_ns = first ? message.log_ns : std::max(chunk.last_log_ns, message.log_ns);
         chunk.topics |= topicBit(message.topic);
+        topic(message.topic).add(1, message.log_ns, message.log_ns);
       }
     } catch (const std::runtime_error&) {
       damage = std::current_exception();

@@ -105,7 +105,7 @@ class Ros1Bag : public ChunkedBag {
   std::uint64_t readBagHeader(std::uint64_t offset);
   void readSummary(std::uint64_t offset);
   void addConnection(const Ros1Record& record);
-  void addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) const;
+  void addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks);
   std::optional<std::size_t> topicOf(std::uint32_t connection) const {
     const auto found = topic_of_.find(connection);
     if (found == topic_of_.end()) return std::nullopt;
@@ -180,7 +180,7 @@ void Ros1Bag::addConnection(const Ros1Record& record) {
   topic_of_[record.fields.number<std::uint32_t>("conn")] = addTopic(topic);
 }
 
-void Ros1Bag::addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) const {
+void Ros1Bag::addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) {
   BagChunk chunk;
   chunk.offset = record.fields.number<std::uint64_t>("chunk_pos");
   chunk.first_log_ns = record.fields.time("start_time");
@@ -188,9 +188,11 @@ void Ros1Bag::addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) 
   chunk.topics = 0;
   ByteReader counts(record.data, record.size);  // of messages, per connection
   while (counts.remaining() > 0) {
-    const auto topic = topicOf(counts.number<std::uint32_t>());
-    counts.number<std::uint32_t>();
-    if (topic) chunk.topics |= topicBit(*topic);
+    const auto found = topicOf(counts.number<std::uint32_t>());
+    const auto count = counts.number<std::uint32_t>();
+    if (!found) continue;
+    chunk.topics |= topicBit(*found);
+    topic(*found).add(count, chunk.first_log_ns, chunk.last_log_ns);
   }
   chunks.push_back(chunk);
 }

@@ -91,6 +91,7 @@ class Db3Bag : public BagSource {
   }
 
   BagCursor messages(std::size_t topic, std::int64_t from_log_ns) override;
+  void countMessages() override;
 
  private:
   void open();
@@ -145,6 +146,19 @@ BagCursor Db3Bag::messages(std::size_t topic, std::int64_t from_log_ns) {
     message = {logTime(*query), data, size, true};
     return true;
   };
+}
+
+/// Reads the head of each message.
+void Db3Bag::countMessages() {
+  SqlQuery query(database_.get(), name_,
+                 "SELECT min(timestamp), max(timestamp), count(*), topic_id FROM messages GROUP BY "
+                 "topic_id");
+  while (query.next()) {
+    const auto id = std::find(ids_.begin(), ids_.end(), query.number(3));
+    if (id == ids_.end()) continue;
+    topic(static_cast<std::size_t>(id - ids_.begin()))
+        .add(static_cast<std::uint64_t>(query.number(2)), logTime(query), query.number(1));
+  }
 }
 
 }  // namespace

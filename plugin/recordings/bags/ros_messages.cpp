@@ -29,6 +29,9 @@ constexpr NamedChoice<RosType> kRosTypes[] = {
     {RosType::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped"},
     {RosType::kTransform, "geometry_msgs/TransformStamped"},
     {RosType::kOdometry, "nav_msgs/Odometry"},
+    {RosType::kPath, "nav_msgs/Path"},
+    {RosType::kTransforms, "tf2_msgs/TFMessage"},
+    {RosType::kTransforms, "tf/tfMessage"},
     {RosType::kCameraInfo, "sensor_msgs/CameraInfo"},
 };
 
@@ -69,11 +72,12 @@ class MessageFields {
     return cdr_ && !text.empty() ? text.substr(0, text.size() - 1) : text;  // a zero at the end
   }
   /// Reads the header. @return its stamp.
-  std::int64_t header() {
+  std::int64_t header() { return headerAndFrame().first; }
+  /// Reads the header. @return its stamp and its frame.
+  std::pair<std::int64_t, std::string_view> headerAndFrame() {
     if (!cdr_) bytes_.number<std::uint32_t>();  // seq
     const std::int64_t t_ns = time();
-    text();  // frame_id
-    return t_ns;
+    return {t_ns, text()};
   }
   CameraSize size() {
     const auto side = [this](const char* name) {
@@ -145,6 +149,12 @@ void forWords(const EventPacketMessage& packet, const Take& take) {
                                        packet.data_size, packet.encoding, sizeof(Word)));
 }
 
+PoseNumbers takePose(MessageFields& fields) {
+  PoseNumbers numbers;
+  for (double& value : numbers) value = fields.number<double>();
+  return numbers;
+}
+
 }  // namespace
 
 RosType rosTypeOf(std::string_view type) {
@@ -160,7 +170,7 @@ bool hasEvents(RosType type) {
 
 bool hasPoses(RosType type) {
   return type == RosType::kPose || type == RosType::kPoseWithCovariance ||
-         type == RosType::kTransform || type == RosType::kOdometry;
+         type == RosType::kTransform || type == RosType::kOdometry || type == RosType::kPath;
 }
 
 CameraSize decodeEventArray(const BagMessage& message, std::vector<Event>& events) {
@@ -285,24 +295,48 @@ void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>
   });
 }
 
-StampedPose decodePose(const BagMessage& message, RosType type) {
+Rigid3 rigidOf(const PoseNumbers& numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (std::isfinite(numbers[i])) continue;
+    throw std::runtime_error(fmt::format("{} = {}: expected a finite number",
+                                         i < 3 ? "position" : "orientation", numbers[i]));
+  }
+  const Eigen::Quaterniond quaternion(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (const auto rotation = rotationNear(quaternion)) {
+    return {*rotation, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])};
+  }
+  throw std::runtime_error(
+      fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation",
+                  quaternion.coeffs().stableNorm()));
+}
+
+std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type) {
   MessageFields fields(message);
-  StampedPose pose;
-  pose.t_ns = fields.header();
+  std::vector<StampedPose> poses;
+  const std::int64_t t_ns = fields.header();
+  if (type == RosType::kPath) {
+    for (auto count = fields.number<std::uint32_t>(); count > 0; --count) {
+      const std::int64_t stamp_ns = fields.header();
+      poses.push_back({stamp_ns, rigidOf(takePose(fields))});
+    }
+    return poses;
+  }
   if (type == RosType::kTransform || type == RosType::kOdometry) fields.text();  // child_frame_id
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    pose.T_world_rig.translation[axis] = fields.finite("position");
+  return {{t_ns, rigidOf(takePose(fields))}};
+}
+
+std::vector<FrameTransform> decodeTransforms(const BagMessage& message) {
+  const auto nameOf = [](std::string_view frame) {
+    return std::string(frame.substr(frame.substr(0, 1) == "/" ? 1 : 0));
+  };
+  MessageFields fields(message);
+  std::vector<FrameTransform> transforms;
+  for (auto count = fields.number<std::uint32_t>(); count > 0; --count) {
+    const auto [t_ns, parent] = fields.headerAndFrame();
+    const std::string_view child = fields.text();
+    transforms.push_back({nameOf(parent), nameOf(child), t_ns, takePose(fields)});
   }
-  Eigen::Quaterniond numbers;
-  for (Eigen::Index i = 0; i < 4; ++i) numbers.coeffs()[i] = fields.finite("orientation");
-  const auto rotation = rotationNear(numbers);
-  if (!rotation) {
-    throw std::runtime_error(
-        fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation",
-                    numbers.coeffs().stableNorm()));
-  }
-  pose.T_world_rig.rotation = *rotation;
-  return pose;
+  return transforms;
 }
 
 CameraModel decodeCameraInfo(const BagMessage& message) {

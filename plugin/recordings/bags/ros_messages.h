@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -27,12 +29,15 @@ enum class RosType {
   kPoseWithCovariance,  ///< geometry_msgs/PoseWithCovarianceStamped
   kTransform,           ///< geometry_msgs/TransformStamped
   kOdometry,            ///< nav_msgs/Odometry
+  kPath,                ///< nav_msgs/Path
+  kTransforms,          ///< tf2_msgs/TFMessage and its former name tf/tfMessage
   kCameraInfo,          ///< sensor_msgs/CameraInfo
 };
 
 /// @param type name of the type, as in BagTopic.
 RosType rosTypeOf(std::string_view type);
 bool hasEvents(RosType type);
+/// Transforms between any frames are no poses of a body.
 bool hasPoses(RosType type);
 
 /// Appends the events of an EventArray: if it is damaged, the events before the damage.
@@ -70,10 +75,25 @@ void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& e
 /// column; the next vector begins after it. All values are 0 at the beginning of a packet.
 void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events);
 
-/// Decodes T_world_body from any type that `hasPoses`: the pose itself, or the child frame's pose.
+/// Decodes T_world_body from any type that `hasPoses`: the pose itself, the child frame's pose, or
+/// all poses of a path.
 /// @throws std::runtime_error also for values that are not finite and for a quaternion that is not
 /// of length 1 within 1 %.
-StampedPose decodePose(const BagMessage& message, RosType type);
+std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type);
+
+/// Position and quaternion x y z w.
+using PoseNumbers = std::array<double, 7>;
+/// @throws std::runtime_error as `decodePoses`.
+Rigid3 rigidOf(const PoseNumbers& numbers);
+
+/// A transform T_parent_child between two frames, whose names have no slash at their beginning. Its
+/// numbers may be wrong.
+struct FrameTransform {
+  std::string parent, child;
+  std::int64_t t_ns;
+  PoseNumbers numbers;
+};
+std::vector<FrameTransform> decodeTransforms(const BagMessage& message);
 
 /// Decodes a camera. Distortion models: plumb_bob (radtan), equidistant or fisheye (the same
 /// model); none if there are no coefficients. fx = 0 if the camera is not calibrated.

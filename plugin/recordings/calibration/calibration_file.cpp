@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -13,7 +14,9 @@
 #include <system_error>
 #include <utility>
 
+#include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"
+#include "maps/io/npy_header.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "plugin/recordings/calibration/yaml_entry.h"
 
@@ -59,21 +62,21 @@ Calibration readYamlCalibration(const std::filesystem::path& file) {
     if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
     if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
     if (entry.has("value0")) return readTumVieCalibration(entry, file);
-    if (entry.has("img_size")) return {file, {{{readMetavisionCamera(entry), {}, 0}}}};
     if (entry.has("cameras")) return {file, readDvCameras(entry)};
-    if (entry.has("camera_matrix")) return {file, {{{readCameraInfo(entry), {}, 0}}}};
+    if (const auto camera = readOneCamera(entry)) return {file, {{{*camera, {}, 0}}}};
   }
   throw std::runtime_error(
       fmt::format("{}: not a calibration: expected {}", file.string(), kCalibrationFiles));
 }
 
-std::vector<double> readNumbers(const std::filesystem::path& file) {
+std::vector<double> readNumbers(const std::filesystem::path& file,
+                                std::string_view blanks = kLineBlanks) {
   std::ifstream stream(file);
   std::vector<double> numbers;
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
-    for (const std::string_view word : splitWords(content.substr(0, content.find('#')))) {
+    for (const std::string_view word : splitWords(content.substr(0, content.find('#')), blanks)) {
       const std::optional<double> value = parseFinite(word);
       if (!value) {
         throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),
@@ -83,6 +86,23 @@ std::vector<double> readNumbers(const std::filesystem::path& file) {
     }
   }
   if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return numbers;
+}
+
+/// Returns the numbers of an array, row after row.
+std::vector<double> numbersInNpy(const std::string& text, const std::filesystem::path& file) {
+  std::vector<double> numbers;
+  try {
+    const NpyHeader header = parseNpyHeader(text);
+    requirePlainRows(header);
+    for (std::size_t at = header.data_begin;
+         numbers.size() < header.count() && at + header.element_bytes <= text.size();
+         at += header.element_bytes) {
+      numbers.push_back(numberAt(&text[at], header.type, header.big_endian));
+    }
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
   return numbers;
 }
 
@@ -113,11 +133,30 @@ RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>
   return camera;
 }
 
+Calibration Calibration::of(std::size_t count, const std::vector<int>& selected) const {
+  Calibration less = *this;
+  if (rig.cameras.size() <= count || selected.size() != count) return less;
+  less.rig.cameras.clear();
+  for (const int camera : selected) {
+    if (camera < 0 || static_cast<std::size_t>(camera) >= rig.cameras.size()) return *this;
+    less.rig.cameras.push_back(rig.cameras[static_cast<std::size_t>(camera)]);
+  }
+  return less;
+}
+
 void Calibration::requireCameras(std::size_t count) const {
-  if (rig.cameras.size() == count) return;
-  throw std::invalid_argument(fmt::format("{}: {}: expected {}, as the recording has",
-                                          file.string(), camerasInWords(rig.cameras.size()),
-                                          count));
+  const std::size_t own = rig.cameras.size();
+  if (own == count) return;
+  std::string last;  // the last cameras, as many as the recording has
+  for (std::size_t i = own - std::min(count, own); i < own && own > count; ++i) {
+    last += fmt::format("{}{}", last.empty() ? "" : ",", i);
+  }
+  throw std::invalid_argument(fmt::format(
+      "{}: {}: expected {}, as the recording has{}", file.string(), camerasInWords(own), count,
+      last.empty()
+          ? ""
+          : fmt::format("; `map --calibration {} --set rig.cameras={}` takes the camera {}",
+                        file.string(), last, last)));
 }
 
 void Calibration::requireLike(const Rig& recorded) const {
@@ -173,12 +212,27 @@ Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibra
   constexpr const char* kKey = "T_body_rig";
   constexpr const char* kExpected =
       "expected YAML, T_body_rig: 4 rows of 4 numbers, from the rig's frame to that of the tracked "
-      "body; or a Kalibr camera chain with T_cam_imu, easy_handeye's result, DSEC's "
+      "body; these numbers as text or .npy; a Kalibr camera chain with T_cam_imu, easy_handeye's "
+      "result, DSEC's "
       "cam_to_lidar.yaml, or TUM-VIE's mocap-imu-calibration*.json";
-  if (file.extension() == ".npz" || file.extension() == ".npy") {
-    throw std::runtime_error(fmt::format("{}: a NumPy file: {}", file.string(), kExpected));
+  const std::string text = readText(file);
+  if (text.compare(0, 2, "PK") == 0) {
+    throw std::runtime_error(
+        fmt::format("{}: an archive, as .npz of NumPy: {}", file.string(), kExpected));
   }
-  const YAML::Node root = loadYaml(file.string());
+  const bool npy = looksLikeNpy(text);
+  const bool only_numbers = text.find_first_of(":{<") == std::string::npos;
+  const std::vector<double> numbers = npy            ? numbersInNpy(text, file)
+                                      : only_numbers ? readNumbers(file, " \t\r,;[]")
+                                                     : std::vector<double>();
+  if (numbers.size() == 16) {
+    const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(numbers.data());
+    if (const auto T_body_rig = transformNear(matrix)) return *T_body_rig;
+    throw std::runtime_error(
+        file.string() +
+        ": a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001");
+  }
+  const YAML::Node root = npy ? YAML::Node() : loadYaml(file.string());
   if (root.IsMap()) {
     const YamlEntry entry(file.string(), "", root);
     if (entry.has(kKey)) return entry.transform(kKey);

@@ -40,6 +40,10 @@ struct Calibration {
   /// @param sensor the camera's size, if the recording has it.
   RigCamera camera(std::size_t index, const std::optional<CameraSize>& sensor) const;
 
+  /// Returns the calibration of a recording with fewer cameras: of those that `selected` names, if
+  /// they are as many. The rig's frame stays that of camera 0.
+  Calibration of(std::size_t count, const std::vector<int>& selected) const;
+
   /// @throws std::invalid_argument naming the file, if it has more or fewer cameras.
   void requireCameras(std::size_t count) const;
 
@@ -50,14 +54,13 @@ struct Calibration {
 /// The files that `readCalibration` accepts, for errors.
 inline constexpr const char* kCalibrationFiles =
     "a Kalibr camera chain, DSEC's cam_to_cam.yaml, TUM-VIE's camera-calibration*.json, "
-    "camera_info YAML of ROS or OpenCV, JSON of Metavision or dv-processing, an .ini file of "
-    "MRPT's "
-    "camera calibration, or nine numbers, fx fy cx cy k1 k2 p1 p2 k3 (and width height)";
+    "camera_info YAML of ROS, OpenCV or VINS, JSON of Metavision or dv-processing, an .ini file of "
+    "MRPT's camera calibration, or nine numbers, fx fy cx cy k1 k2 p1 p2 k3 (and width height)";
 
 /// Reads a calibration, whose kind is found by its content: see `readCamchain`,
-/// `readDsecCalibration`, `readTumVieCalibration`, `readCameraInfo`, `readMetavisionCamera`,
-/// `readDvCameras`, `readMrptCameras` and `readUzhCalibration`; the file of `readUzhCalibration`
-/// does not have the sensor's size.
+/// `readDsecCalibration`, `readTumVieCalibration`, `readOneCamera`, `readDvCameras`,
+/// `readMrptCameras` and `readUzhCalibration`; the file of `readUzhCalibration` does not have the
+/// sensor's size.
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
@@ -75,6 +78,7 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 ///   T_world_rig = T_world_body * T_body_rig.
 /// The kind of the file is found by its content:
 /// - YAML with T_body_rig, 4x4, from the rig's frame to the body's; other keys are ignored.
+/// - Text or a NumPy array (.npy) of these numbers alone.
 /// - The result of easy_handeye with the eye on the hand: the body is the robot's effector.
 /// - A Kalibr camera chain: the body is the IMU, see `readCamchainImu`.
 /// - DSEC's cam_to_lidar.yaml: the body is the LiDAR, see `readDsecHandEye`.

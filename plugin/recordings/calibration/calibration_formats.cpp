@@ -13,56 +13,188 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
 
-/// Sets the size of the sensor. @param key key of the size, for errors.
-void setSensorSize(const YamlEntry& entry, const char* key, double width, double height,
+constexpr const char* kMatrix = "9, fx 0 cx 0 fy cy 0 0 1";
+
+/// The names that programs give to the models of lenses.
+constexpr NamedChoice<DistortionModel> kLenses[] = {
+    {DistortionModel::kRadtan, "radtan"},
+    {DistortionModel::kRadtan, "plumb_bob"},
+    {DistortionModel::kRadtan, "radialTangential"},
+    {DistortionModel::kRadtan, "PINHOLE"},
+    {DistortionModel::kEquidistant, "equidistant"},
+    {DistortionModel::kEquidistant, "fisheye"},
+    {DistortionModel::kEquidistant, "kannala_brandt"},
+    {DistortionModel::kEquidistant, "KANNALA_BRANDT"},
+    {DistortionModel::kEquidistant, "kb4"},
+    {DistortionModel::kNone, "none"},
+};
+
+/// The keys of a camera in the files of a program; "a: b c" are the keys b and c below a. Values
+/// are numbers or lists of numbers, taken together.
+struct CameraForm {
+  const char* intrinsics;  ///< fx fy cx cy, or a 3x3 matrix.
+  bool is_matrix;
+  const char* size;  ///< Width and height; null: they are elsewhere.
+  const char* lens;  ///< The model of the lens, a name of kLenses; the first key that exists.
+  const char* default_lens;  ///< The model without these keys; null: it is an error.
+  const char* coefficients;
+};
+
+constexpr CameraForm kKalibr = {"intrinsics",       false,   "resolution",
+                                "distortion_model", nullptr, "distortion_coeffs"};
+constexpr CameraForm kDsec = {"camera_matrix",    false,   "resolution",
+                              "distortion_model", nullptr, "distortion_coeffs"};
+constexpr CameraForm kTumVie = {"intrinsics: fx fy cx cy", false, nullptr, "camera_type", nullptr,
+                                "intrinsics: k1 k2 k3 k4"};
+constexpr CameraForm kDv = {
+    "focalLength principalPoint", false, "resolution", "distortionModel", nullptr,
+    "distortionCoefficients"};
+constexpr CameraForm kMrpt = {"fx fy cx cy", false, "resolution", "distortion_model distortion",
+                              "plumb_bob",   "dist"};
+
+/// The files of one camera, by a key that only these files have.
+constexpr std::pair<const char*, CameraForm> kOneCamera[] = {
+    // Metavision
+    {"img_size", {"K", true, "img_size", "type", nullptr, "D"}},
+    // camera_calibration of ROS, and OpenCV, whose files do not name the model
+    {"camera_matrix",
+     {"camera_matrix: data", true, "image_width image_height", "distortion_model camera_model",
+      "plumb_bob", "distortion_coefficients: data"}},
+    // Messages of CameraInfo as text, of ROS 1 and 2
+    {"K", {"K", true, "width height", "distortion_model", nullptr, "D"}},
+    {"k", {"k", true, "width height", "distortion_model", nullptr, "d"}},
+    // VINS and camodocal
+    {"projection_parameters: mu",
+     {"projection_parameters: mu mv u0 v0", false, "image_width image_height", "model_type",
+      nullptr, "projection_parameters: k2 k3 k4 k5"}},
+    {"projection_parameters: fx",
+     {"projection_parameters: fx fy cx cy", false, "image_width image_height", "model_type",
+      nullptr, "distortion_parameters: k1 k2 p1 p2"}},
+};
+
+/// Returns the part of a file with keys, and the keys in it: a part and "b c" for "a: b c".
+std::pair<YamlEntry, std::vector<std::string>> placeOf(const YamlEntry& entry,
+                                                       std::string_view keys) {
+  const std::size_t colon = keys.find(": ");
+  if (colon != std::string_view::npos) {
+    return placeOf(entry.section(std::string(keys.substr(0, colon)).c_str()),
+                   keys.substr(colon + 2));
+  }
+  const auto words = splitWords(keys);
+  return {entry, {words.begin(), words.end()}};
+}
+
+bool hasPlace(const YamlEntry& entry, const std::string& keys) {
+  const std::string first = keys.substr(0, keys.find(": "));
+  return entry.has(first.c_str()) &&
+         (first == keys || entry.section(first.c_str()).has(keys.substr(first.size() + 2).c_str()));
+}
+
+/// @param count expected number of numbers; 0: any.
+std::vector<double> numbersAt(const YamlEntry& entry, const char* keys, std::size_t count,
+                              const char* expected) {
+  const auto [place, names] = placeOf(entry, keys);
+  if (names.size() == 1) return place.numbers(names[0].c_str(), count, expected);
+  std::vector<double> all;
+  for (const std::string& name : names) {
+    if (place.sizeOf(name.c_str()) == 0) {
+      all.push_back(place.number(name.c_str()));
+      continue;
+    }
+    const std::vector<double> list = place.numbers(name.c_str(), 2, "2 numbers");
+    all.insert(all.end(), list.begin(), list.end());
+  }
+  return all;
+}
+
+/// Sets the size of the sensor. @param keys its keys, for errors.
+void setSensorSize(const YamlEntry& entry, std::string_view keys, double width, double height,
                    CameraModel& model) {
-  for (const double side : {width, height}) {
+  const std::vector<std::string> names = placeOf(entry, keys).second;
+  for (const auto& [side, name] : {std::pair(width, names.front()), {height, names.back()}}) {
     if (std::floor(side) == side && side >= 1 && side <= 65535) continue;
-    throw entry.failKey(key, fmt::format("{:g}", side), "whole numbers from 1 to 65535");
+    throw entry.failKey(name.c_str(), fmt::format("{:g}", side), "whole numbers from 1 to 65535");
   }
   model.width = static_cast<int>(width);
   model.height = static_cast<int>(height);
 }
 
-/// @throws std::runtime_error naming the entry, if `CameraModel::validate` rejects the model.
-void requireValid(const YamlEntry& entry, const CameraModel& model) {
+DistortionModel lensOf(const YamlEntry& entry, const CameraForm& form) {
+  const std::vector<std::string> keys = placeOf(entry, form.lens).second;
+  const auto key = std::find_if(keys.begin(), keys.end(),
+                                [&](const std::string& name) { return entry.has(name.c_str()); });
+  const bool is_default = key == keys.end() && form.default_lens != nullptr;
+  const std::string& used = key == keys.end() ? keys.front() : *key;
+  const std::string name = is_default ? form.default_lens : entry.text(used.c_str());
+  for (const auto& lens : kLenses) {
+    if (lens.name == name) return lens.value;
+  }
+  throw entry.failKey(used.c_str(), inQuotes(name),
+                      "radtan (plumb_bob, radialTangential, PINHOLE), equidistant (fisheye, "
+                      "kannala_brandt, kb4) or none");
+}
+
+/// Reads a camera. Coefficients after the model's own must be 0.
+/// @param size the sensor's size if the form does not have it.
+CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
+                       const CameraSize& size = {}) {
+  const DistortionModel lens = lensOf(entry, form);
+  std::vector<double> k = form.is_matrix ? numbersAt(entry, form.intrinsics, 9, kMatrix)
+                                         : numbersAt(entry, form.intrinsics, 4, "4, fx fy cx cy");
+  if (form.is_matrix) {
+    if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+      const auto [place, names] = placeOf(entry, form.intrinsics);
+      throw place.failKey(names[0].c_str(), "a matrix with skew or another last row", kMatrix);
+    }
+    k = {k[0], k[4], k[2], k[5]};
+  }
+  CameraModel model{size.width, size.height, k[0], k[1], k[2], k[3], lens, {}};
+  if (form.size != nullptr) {
+    const std::vector<double> sides = numbersAt(entry, form.size, 2, "2, width height");
+    setSensorSize(entry, form.size, sides[0], sides[1], model);
+  }
+  if (model.distortion != DistortionModel::kNone || hasPlace(entry, form.coefficients)) {
+    model.coefficients = numbersAt(entry, form.coefficients, 0, "a list of numbers");
+  }
+  const std::size_t most = model.distortion == DistortionModel::kRadtan        ? 5
+                           : model.distortion == DistortionModel::kEquidistant ? 4
+                                                                               : 0;
+  while (model.coefficients.size() > most && model.coefficients.back() == 0) {
+    model.coefficients.pop_back();
+  }
   try {
     model.validate();
   } catch (const std::invalid_argument& error) {
     throw entry.fail(error.what());
   }
+  return model;
 }
 
-/// Reads a camera from the keys camera_model (pinhole), distortion_model (radtan, equidistant or
-/// none), distortion_coeffs and resolution, and the four intrinsics fx fy cx cy.
-/// @param intrinsics_key "intrinsics" in Kalibr's files, "camera_matrix" in DSEC's.
-CameraModel readKalibrCamera(const YamlEntry& entry, const char* intrinsics_key) {
+/// @param v x y z qx qy qz qw.
+Rigid3 rigidFrom(const YamlEntry& entry, const std::vector<double>& v) {
+  const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
+  if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
+  throw entry.fail(
+      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 "
+                  "within 1 %",
+                  numbers.coeffs().stableNorm()));
+}
+
+CameraModel readKalibrCamera(const YamlEntry& entry, const CameraForm& form) {
   const std::string kind = entry.text("camera_model");
   if (kind != "pinhole") throw entry.failKey("camera_model", inQuotes(kind), "pinhole");
-
-  const std::vector<double> k = entry.numbers(intrinsics_key, 4, "4, fx fy cx cy");
-  CameraModel model{0, 0, k[0], k[1], k[2], k[3], DistortionModel::kNone, {}};
-  const std::vector<double> resolution = entry.numbers("resolution", 2, "2, width height");
-  setSensorSize(entry, "resolution", resolution[0], resolution[1], model);
-  const std::string distortion = entry.text("distortion_model");
-  try {
-    model.distortion = distortionModelFromName(distortion);
-  } catch (const std::invalid_argument&) {
-    throw entry.failKey("distortion_model", inQuotes(distortion), "radtan, equidistant or none");
-  }
-  if (model.distortion != DistortionModel::kNone || entry.has("distortion_coeffs")) {
-    model.coefficients = entry.numbers("distortion_coeffs", 0, "a list of numbers");
-  }
-  requireValid(entry, model);
-  return model;
+  return readCamera(entry, form);
 }
 
 /// Reads the offset of the camera's clock: t_imu = t_cam + timeshift_cam_imu.
@@ -114,7 +246,7 @@ Rig readCamchain(const std::filesystem::path& file) {
     const std::string name = fmt::format("cam{}", n);
     const YamlEntry entry(file.string(), name, root[name]);
     RigCamera camera;
-    camera.model = readKalibrCamera(entry, "intrinsics");
+    camera.model = readKalibrCamera(entry, kKalibr);
     if (n > 0) {
       const Rigid3 T_cn_cnm1 = entry.transform("T_cn_cnm1");
       camera.T_rig_cam = rig.cameras[n - 1].T_rig_cam * T_cn_cnm1.inverse();
@@ -140,42 +272,11 @@ std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file) {
   return cam0.transform(kKey).inverse();
 }
 
-CameraModel readCameraInfo(const YamlEntry& root) {
-  constexpr const char* kForm = "9, fx 0 cx 0 fy cy 0 0 1";
-  const YamlEntry matrix = root.section("camera_matrix");
-  const std::vector<double> k = matrix.numbers("data", 9, kForm);
-  if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
-    throw matrix.failKey("data", "a matrix with skew or another last row", kForm);
+std::optional<CameraModel> readOneCamera(const YamlEntry& root) {
+  for (const auto& [found, form] : kOneCamera) {
+    if (hasPlace(root, found)) return readCamera(root, form);
   }
-  CameraModel model{0, 0, k[0], k[4], k[2], k[5], DistortionModel::kRadtan, {}};
-  const double width = root.number("image_width");
-  setSensorSize(root, "image_width", width, 1, model);
-  setSensorSize(root, "image_height", width, root.number("image_height"), model);
-
-  // OpenCV's files have no model; some of ROS call it camera_model.
-  const char* const key = root.has("distortion_model") ? "distortion_model" : "camera_model";
-  const std::string distortion = root.has(key) ? root.text(key) : "plumb_bob";
-  if (distortion == "equidistant" || distortion == "fisheye") {
-    model.distortion = DistortionModel::kEquidistant;
-  } else if (distortion != "plumb_bob") {
-    throw root.failKey(key, inQuotes(distortion), "plumb_bob, equidistant or fisheye");
-  }
-  model.coefficients =
-      root.section("distortion_coefficients").numbers("data", 0, "a list of numbers");
-  requireValid(root, model);
-  return model;
-}
-
-CameraModel readMetavisionCamera(const YamlEntry& root) {
-  const std::vector<double> k = root.numbers("K", 9, "9, fx 0 cx 0 fy cy 0 0 1");
-  const std::vector<double> size = root.numbers("img_size", 2, "2, width height");
-  CameraModel model{0, 0, k[0], k[4], k[2], k[5], DistortionModel::kRadtan, {}};
-  setSensorSize(root, "img_size", size[0], size[1], model);
-  const std::string type = root.text("type");
-  if (type != "PINHOLE") throw root.failKey("type", inQuotes(type), "PINHOLE");
-  model.coefficients = root.numbers("D", 0, "a list of numbers");
-  requireValid(root, model);
-  return model;
+  return std::nullopt;
 }
 
 Rig readDvCameras(const YamlEntry& root) {
@@ -183,21 +284,7 @@ Rig readDvCameras(const YamlEntry& root) {
   const std::size_t count = root.sizeOf("cameras");
   for (std::size_t n = 0; n < count; ++n) {
     const YamlEntry entry = root.item("cameras", n);
-    const std::vector<double> focal = entry.numbers("focalLength", 2, "2, fx fy");
-    const std::vector<double> center = entry.numbers("principalPoint", 2, "2, cx cy");
-    const std::vector<double> size = entry.numbers("resolution", 2, "2, width height");
-    CameraModel model{0, 0, focal[0], focal[1], center[0], center[1], DistortionModel::kRadtan, {}};
-    setSensorSize(entry, "resolution", size[0], size[1], model);
-    const std::string distortion = entry.text("distortionModel");
-    if (distortion == "equidistant") {
-      model.distortion = DistortionModel::kEquidistant;
-    } else if (distortion != "radialTangential") {
-      throw entry.failKey("distortionModel", inQuotes(distortion),
-                          "radialTangential or equidistant");
-    }
-    model.coefficients = entry.numbers("distortionCoefficients", 0, "a list of numbers");
-    requireValid(entry, model);
-    rig.cameras.push_back({model, entry.transform("transformationToC0"), 0});
+    rig.cameras.push_back({readCamera(entry, kDv), entry.transform("transformationToC0"), 0});
   }
   return rig;
 }
@@ -210,11 +297,7 @@ Rigid3 readEasyHandEye(const YamlEntry& root) {
                                "true: a camera on the tracked body");
     }
   }
-  const YamlEntry t = root.section("transformation");
-  const Eigen::Quaterniond numbers(t.number("qw"), t.number("qx"), t.number("qy"), t.number("qz"));
-  const auto rotation = rotationNear(numbers);
-  if (!rotation) throw t.fail("qx qy qz qw: expected a quaternion of length 1");
-  return {*rotation, {t.number("x"), t.number("y"), t.number("z")}};
+  return rigidFrom(root, numbersAt(root, "transformation: x y z qx qy qz qw", 7, ""));
 }
 
 Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::path& file) {
@@ -223,7 +306,7 @@ Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::pa
   Calibration calibration{file, {}};
   for (const char* name : {"cam0", "cam3"}) {
     RigCamera& camera = calibration.rig.cameras.emplace_back();
-    camera.model = readKalibrCamera(intrinsics.section(name), "camera_matrix");
+    camera.model = readKalibrCamera(intrinsics.section(name), kDsec);
   }
   const Rigid3 T_cam1_cam0 = extrinsics.transform("T_10");
   const Rigid3 T_cam3_cam0 =
@@ -250,39 +333,14 @@ constexpr Eigen::Index kTumVieCameras = 4;
 constexpr std::size_t kTumVieEventCameras[] = {2, 3};
 
 Rigid3 jsonPose(const YamlEntry& pose) {
-  const Eigen::Quaterniond rotation(pose.number("qw"), pose.number("qx"), pose.number("qy"),
-                                    pose.number("qz"));
-  const double norm = rotation.norm();
-  if (!(std::abs(norm - 1) <= 1e-3)) {
-    throw pose.fail(
-        fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 to 0.001", norm));
-  }
-  return {rotation.normalized(), {pose.number("px"), pose.number("py"), pose.number("pz")}};
-}
-
-CameraModel pinholeOf(const YamlEntry& entry) {
-  CameraModel model;
-  model.fx = entry.number("fx");
-  model.fy = entry.number("fy");
-  model.cx = entry.number("cx");
-  model.cy = entry.number("cy");
-  return model;
+  return rigidFrom(pose, numbersAt(pose, "px py pz qx qy qz qw", 7, ""));
 }
 
 CameraModel kb4Camera(const YamlEntry& value, std::size_t index, const Eigen::MatrixXd& sizes) {
-  const YamlEntry camera = value.item("intrinsics", index);
-  const std::string type = camera.text("camera_type");
-  if (type != "kb4") throw camera.failKey("camera_type", inQuotes(type), "kb4");
-  const YamlEntry numbers = camera.section("intrinsics");
-  CameraModel model = pinholeOf(numbers);
-  model.distortion = DistortionModel::kEquidistant;
-  for (const char* key : {"k1", "k2", "k3", "k4"}) {
-    model.coefficients.push_back(numbers.number(key));
-  }
   const auto row = static_cast<Eigen::Index>(index);
-  setSensorSize(value, "resolution", sizes(row, 0), sizes(row, 1), model);
-  requireValid(numbers, model);
-  return model;
+  CameraModel sized;
+  setSensorSize(value, "resolution", sizes(row, 0), sizes(row, 1), sized);
+  return readCamera(value.item("intrinsics", index), kTumVie, {sized.width, sized.height});
 }
 
 }  // namespace
@@ -370,39 +428,9 @@ std::map<std::string, YAML::Node> iniSections(std::string_view text,
   return sections;
 }
 
-CameraModel mrptCamera(const YamlEntry& entry) {
-  CameraModel model = pinholeOf(entry);
-  const std::vector<double> size = entry.numbers("resolution", 2, "2, width height");
-  setSensorSize(entry, "resolution", size[0], size[1], model);
-
-  const char* const key = entry.has("distortion_model") ? "distortion_model" : "distortion";
-  const std::string distortion = entry.has(key) ? entry.text(key) : "plumb_bob";
-  if (distortion == "plumb_bob") {
-    model.distortion = DistortionModel::kRadtan;
-    model.coefficients = entry.numbers("dist", 0, "a list of numbers");
-    while (model.coefficients.size() > 5 && model.coefficients.back() == 0) {
-      model.coefficients.pop_back();
-    }
-  } else if (distortion == "kannala_brandt") {
-    model.distortion = DistortionModel::kEquidistant;
-    model.coefficients = entry.numbers("dist", 4, "4, k1 k2 k3 k4");
-  } else if (distortion != "none") {
-    throw entry.failKey(key, inQuotes(distortion), "none, plumb_bob or kannala_brandt");
-  }
-  requireValid(entry, model);
-  return model;
-}
-
 Rigid3 mrptPose(const YamlEntry& entry) {
-  constexpr const char* kKey = "pose_quaternion";
-  const std::vector<double> v = entry.numbers(kKey, 7, "7, x y z qw qx qy qz");
-  const Eigen::Quaterniond rotation(v[3], v[4], v[5], v[6]);
-  const double norm = rotation.norm();
-  if (!(std::abs(norm - 1) <= 1e-3)) {
-    throw entry.failKey(kKey, fmt::format("a quaternion of length {:g}", norm),
-                        "a rotation, of length 1 to 0.001");
-  }
-  return {rotation.normalized(), {v[0], v[1], v[2]}};
+  const auto v = entry.numbers("pose_quaternion", 7, "7, x y z qw qx qy qz");
+  return rigidFrom(entry, {v[0], v[1], v[2], v[4], v[5], v[6], v[3]});
 }
 
 }  // namespace
@@ -431,7 +459,7 @@ Rig readMrptCameras(std::string_view text, const std::filesystem::path& file) {
   }
   Rig rig;
   if (cameras.size() == 1) {
-    rig.cameras.push_back({mrptCamera(entry_of(cameras[0])), {}, 0});
+    rig.cameras.push_back({readCamera(entry_of(cameras[0]), kMrpt), {}, 0});
     return rig;
   }
   const std::string prefix =
@@ -443,8 +471,9 @@ Rig readMrptCameras(std::string_view text, const std::filesystem::path& file) {
         "camera calibration writes them",
         file.string(), cameras.size()));
   }
-  rig.cameras.push_back({mrptCamera(entry_of(cameras[0])), {}, 0});
-  rig.cameras.push_back({mrptCamera(entry_of(cameras[1])), mrptPose(entry_of(prefix + kPose)), 0});
+  rig.cameras.push_back({readCamera(entry_of(cameras[0]), kMrpt), {}, 0});
+  rig.cameras.push_back(
+      {readCamera(entry_of(cameras[1]), kMrpt), mrptPose(entry_of(prefix + kPose)), 0});
   return rig;
 }
 

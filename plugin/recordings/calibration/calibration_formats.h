@@ -29,22 +29,14 @@ Rig readCamchain(const std::filesystem::path& file);
 /// @return std::nullopt if the camera chain does not have T_cam_imu.
 std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file);
 
-/// Reads one camera from the YAML of ROS (sensor_msgs/CameraInfo as camera_calibration writes it):
-///   image_width, image_height
-///   camera_matrix            data: 9 numbers, fx 0 cx 0 fy cy 0 0 1
-///   distortion_model         plumb_bob (radtan) | equidistant | fisheye (the same); also
-///                            camera_model; plumb_bob if there is neither, as in OpenCV's files
-///   distortion_coefficients  data: 4 or 5 numbers | 4
+/// Reads the file of one camera, from the keys that its program writes: the table kOneCamera has
+/// Metavision, camera_calibration of ROS, OpenCV, messages of CameraInfo, VINS and camodocal.
 /// Rectification and projection are ignored: events are not rectified.
-CameraModel readCameraInfo(const YamlEntry& root);
+/// @return std::nullopt for the file of another program.
+std::optional<CameraModel> readOneCamera(const YamlEntry& root);
 
-/// Reads one camera from Metavision's JSON: img_size [width, height], K (9 numbers, fx 0 cx 0 fy cy
-/// 0 0 1), D (radtan, 4 or 5 numbers), type PINHOLE.
-CameraModel readMetavisionCamera(const YamlEntry& root);
-
-/// Reads the rig from the JSON of dv-processing: `cameras`, each with resolution, focalLength,
-/// principalPoint, distortionModel (radialTangential | equidistant), distortionCoefficients, and
-/// transformationToC0 (16 numbers, row by row: T_rig_cam).
+/// Reads the rig from the JSON of dv-processing: `cameras`, each with transformationToC0 (16
+/// numbers, row by row: T_rig_cam).
 Rig readDvCameras(const YamlEntry& root);
 
 /// Reads the camera's pose on the robot's effector, from the result of easy_handeye:

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 #include <Eigen/Geometry>
+#include <opencv2/core.hpp>
 
 #include <cmath>
+#include <fstream>
 #include <optional>
 #include <utility>
 
@@ -22,6 +24,31 @@ std::optional<double> finiteIn(const YAML::Node& node) {
   std::string_view text = node.Scalar();
   if (text.substr(0, 1) == "+" && text.substr(1, 1) != "-") text.remove_prefix(1);
   return parseFinite(text);
+}
+
+/// Returns a part of a document that OpenCV's FileStorage wrote, as YAML.
+YAML::Node yamlOf(const cv::FileNode& part) {
+  YAML::Node node;
+  if (part.isMap()) {
+    for (const std::string& key : part.keys()) node[key] = yamlOf(part[key]);
+  } else if (part.isSeq()) {
+    for (const cv::FileNode& item : part) node.push_back(yamlOf(item));
+  } else if (part.isString()) {
+    node = part.string();
+  } else if (part.isInt() || part.isReal()) {
+    node = fmt::format("{}", part.real());
+  }
+  return node;
+}
+
+/// Returns the document in an XML file of OpenCV's FileStorage.
+YAML::Node loadXml(const std::string& file) {
+  try {
+    return yamlOf(
+        cv::FileStorage(file, cv::FileStorage::READ | cv::FileStorage::FORMAT_XML).root());
+  } catch (const cv::Exception& error) {
+    throw std::runtime_error(fmt::format("{}: not XML of OpenCV: {}", file, error.err));
+  }
 }
 
 }  // namespace
@@ -147,6 +174,7 @@ std::runtime_error YamlEntry::fail(const YAML::Node& node, std::string_view what
 }
 
 YAML::Node loadYaml(const std::string& file) {
+  if (std::ifstream(file).get() == '<') return loadXml(file);
   try {
     return YAML::LoadFile(file);
   } catch (const YAML::BadFile&) {

@@ -61,6 +61,7 @@ class YamlEntry {
   YAML::Node node_;
 };
 
+/// Reads YAML, JSON, or XML of OpenCV's FileStorage.
 /// @throws std::runtime_error naming the file, and the line that is not YAML.
 YAML::Node loadYaml(const std::string& file);
 

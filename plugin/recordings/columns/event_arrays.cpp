@@ -221,7 +221,28 @@ EventTable eventColumnsOf(const fs::path& file, const ReaderOptions& options) {
                                  : matrixColumnsOf(file, found, options);
 }
 
+std::vector<double> numbersOf(const fs::path& file, const char* member, std::size_t max_count) {
+  const auto array = std::make_shared<NpyArray>(file, member);
+  if (array->header().count() > max_count) {
+    throw std::runtime_error(fmt::format("{}: {} numbers: expected at most {}", array->name(),
+                                         array->header().count(), max_count));
+  }
+  std::vector<double> numbers;
+  for (std::uint64_t row = 0; row < std::min<std::uint64_t>(array->size(), max_count); ++row) {
+    for (std::size_t column = 0; column < array->columns(); ++column) {
+      numbers.push_back(NpyArray::columnOf(array, column).number(row));
+    }
+  }
+  return numbers;
+}
+
 }  // namespace
+
+CameraModel lensIn(const fs::path& archive) {
+  const std::vector<double> k = numbersOf(archive, "K.npy", 9);
+  if (k.size() != 9) throw std::runtime_error(archive.string() + "/K.npy: expected 3 x 3 numbers");
+  return radtanLens(archive, {k[0], k[4], k[2], k[5]}, numbersOf(archive, "D.npy", 5));
+}
 
 std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptions& options) {
   const auto array_of = [](const RowColumn& column) -> const NpyArray& {
@@ -261,6 +282,15 @@ RecordingParts openEventArrays(const std::vector<fs::path>& files, const ReaderO
     EventTable table = eventColumnsOf(file, options);
     if (!options.time_unit.empty()) table.time_unit_ns.reset();  // as for text
     parts.cameras.push_back(openArrayEvents(std::move(table), options));
+  }
+  if (files.size() == 1 && beginsWith(files.front(), "PK")) {
+    const std::vector<std::string> members = membersOf(files.front());
+    const auto has = [&](const char* name) {
+      return std::find(members.begin(), members.end(), name) != members.end();
+    };
+    if (has("K.npy") && has("D.npy")) {
+      parts.calibration = Calibration{files.front(), {{{lensIn(files.front()), {}, 0}}}};
+    }
   }
   return parts;
 }

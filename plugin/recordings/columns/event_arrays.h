@@ -24,6 +24,11 @@ std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptio
 /// Fields and arrays are found by the names that text columns have (xs, timestamps_us, polarity …),
 /// or by the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`. Others are ignored.
 
+/// An archive may also have K (3 x 3) and D (k1 k2 p1 p2 k3), the calibration of its camera.
+
+/// Reads a radtan lens from K and D of an archive, without the sensor's size.
+CameraModel lensIn(const std::filesystem::path& archive);
+
 /// Returns whether a file is a NumPy array, also compressed, or an archive of arrays. Never throws.
 bool looksLikeNumpy(const std::filesystem::path& file);
 

@@ -146,15 +146,17 @@ class TableEvents : public EventStream {
   std::runtime_error failure(std::uint64_t event, char letter) const {
     const bool of_arrays = table_.place.empty();
     std::string value;
+    double real = 0;
     column(letter).from(event).forEach(1, [&](std::size_t, auto number) {
+      real = static_cast<double>(number);
       value =
           of_arrays ? fmt::format("{}", static_cast<double>(number)) : fmt::format("'{}'", number);
       return true;
     });
-    const std::string_view expected = letter == 't'   ? kExpectedTime
-                                      : letter != 'p' ? "a whole number from 0 to 65535"
-                                      : of_arrays     ? "polarity 0 or 1, or -1 or 1"
-                                                      : "polarity 1, 0 or -1";
+    const std::string expected = letter == 't'   ? kExpectedTime
+                                 : letter != 'p' ? expectedPixel(real)
+                                 : of_arrays     ? "polarity 0 or 1, or -1 or 1"
+                                                 : "polarity 1, 0 or -1";
     return std::runtime_error(
         fmt::format("{}: {} = {}: expected {}", placeOf(event, letter), letter, value, expected));
   }

@@ -37,28 +37,6 @@ std::optional<CameraSize> sizeOfDepth(const fs::path& folder) {
   return CameraSize{static_cast<int>(shape[1]), static_cast<int>(shape[0])};
 }
 
-std::vector<double> numbersOf(const fs::path& file, const char* member, std::size_t max_count) {
-  const auto array = std::make_shared<NpyArray>(file, member);
-  if (array->header().count() > max_count) {
-    throw std::runtime_error(fmt::format("{}: {} numbers: expected at most {}", array->name(),
-                                         array->header().count(), max_count));
-  }
-  std::vector<double> numbers;
-  for (std::uint64_t row = 0; row < std::min<std::uint64_t>(array->size(), max_count); ++row) {
-    for (std::size_t column = 0; column < array->columns(); ++column) {
-      numbers.push_back(NpyArray::columnOf(array, column).number(row));
-    }
-  }
-  return numbers;
-}
-
-/// Reads the camera's model, without the sensor's size.
-CameraModel modelOf(const fs::path& info) {
-  const std::vector<double> k = numbersOf(info, "K.npy", 9);
-  if (k.size() != 9) throw std::runtime_error(info.string() + "/K.npy: expected 3 x 3 numbers");
-  return radtanLens(info, {k[0], k[4], k[2], k[5]}, numbersOf(info, "D.npy", 5));
-}
-
 std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOptions& options) {
   const auto t = std::make_shared<NpyArray>(folder / "dataset_events_t.npy");
   const auto xy = std::make_shared<NpyArray>(folder / "dataset_events_xy.npy");
@@ -97,7 +75,7 @@ RecordingParts openEvimo2(const std::vector<fs::path>& folders, const ReaderOpti
   }
   const fs::path info = folders.front() / "dataset_info.npz";
   if (folders.size() == 1 && isFile(info)) {
-    parts.calibration = Calibration{info, {{{modelOf(info), {}, 0}}}};
+    parts.calibration = Calibration{info, {{{lensIn(info), {}, 0}}}};
   } else {
     parts.expected_calibration =
         folders.size() == 1 ? "dataset_info.npz" : "one of all cameras (docs/recordings.md)";

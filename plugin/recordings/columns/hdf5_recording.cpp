@@ -107,6 +107,12 @@ std::unique_ptr<EventStream> openHdf5Events(const std::shared_ptr<const Hdf5File
   for (std::size_t i = 0; i < layout.columns.size(); ++i) {
     const std::string& column = layout.columns[i];
     const auto of_column = rows ? rows : rows_of(column);
+    if (!rows && of_column->rowNumbers() > 1) {
+      throw of_column->fail(
+          fmt::format("N x {} numbers: expected a list; for an N x 4 data set "
+                      "/events: --event-columns \"t x y p\"",
+                      of_column->rowNumbers()));
+    }
     table.column(kHdf5Columns[i]) =
         rows && !column.empty()
             ? Hdf5Rows::ofField(rows, column)

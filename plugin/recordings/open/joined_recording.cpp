@@ -93,6 +93,7 @@ class JoinedRecording : public Recording {
   RecordingCounts counts() const override {
     RecordingCounts counts;
     counts.warnings = parts_.warnings;
+    counts.topics = parts_.topics;
     counts.skipped_events = bad_->count();
     counts.first_skipped = bad_->first();
     for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {

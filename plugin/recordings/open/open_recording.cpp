@@ -89,6 +89,8 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
         source.string(), all.calibration->file.string()));
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
+  std::move(parts.warnings.begin(), parts.warnings.end(), std::back_inserter(all.warnings));
+  std::move(parts.topics.begin(), parts.topics.end(), std::back_inserter(all.topics));
   if (all.poses_damage.empty()) all.poses_damage = std::move(parts.poses_damage);
   if (!all.default_size) all.default_size = parts.default_size;
 }
@@ -188,6 +190,11 @@ void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
 /// Opens the files. Successive files of the same format are opened together.
 RecordingParts openParts(const RecordingSource& source) {
   RecordingParts all;
+  ReaderOptions options = source.reader;
+  options.leaves_out_poses = !source.poses.empty();
+  const RecordingFormat* const of_poses =
+      source.poses.empty() ? nullptr : detectFormat(source.poses);
+  options.topics_of_other_files = of_poses != nullptr && of_poses->name.rfind("rosbag", 0) == 0;
   for (std::size_t i = 0; i < source.files.size();) {
     const RecordingFormat* const format = formatOf(source.files[i], source);
     if (format == nullptr) reject(source.files[i]);
@@ -199,7 +206,7 @@ RecordingParts openParts(const RecordingSource& source) {
     while (i < source.files.size() && formatOf(source.files[i], source) == format) {
       files.push_back(source.files[i++]);
     }
-    RecordingParts parts = format->open(files, source.reader);
+    RecordingParts parts = format->open(files, options);
     if (all.cameras.empty() && all.poses.empty()) {
       std::swap(all, parts);
     } else {
@@ -244,6 +251,7 @@ std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera
 Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given) {
   const std::size_t count = parts.cameras.size();
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
+  if (own != nullptr) own->requireCameras(count);
   const Calibration* const calibration = own != nullptr ? own : given;
   if (calibration == nullptr && source.complete) {
     throw std::runtime_error(fmt::format("{}: no calibration: expected {}, or --calibration FILE",
@@ -385,8 +393,7 @@ RigSetup readRigSetup(const RecordingSource& source) {
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   requireGivenFile(source.poses, "--poses", {});
-  const RigSetup setup = readRigSetup(source);
-  const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
+  RigSetup setup = readRigSetup(source);
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPoses(source.poses, source.reader);
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
@@ -396,6 +403,14 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
   }
 
+  if (setup.calibration) {
+    setup.calibration = setup.calibration->of(parts.cameras.size(), source.cameras);
+  }
+  const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
+  if (given != nullptr && parts.calibration &&
+      parts.calibration->rig.cameras.size() > parts.cameras.size()) {
+    parts.calibration.reset();
+  }
   JoinedParts joined;
   if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, given);
   joined.offsets_ns = offsetsOf(joined.rig, source, given);
@@ -411,6 +426,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   joined.latency_ns = source.faults.latency_ns;
   joined.skip_bad_events = source.skip_bad_events;
   joined.warnings = std::move(parts.warnings);
+  joined.topics = std::move(parts.topics);
   return join(std::move(joined), source.limits);
 }
 

@@ -29,6 +29,8 @@ struct RecordingSource {
   std::string hand_eye_given;
   /// Calibration and hand-eye transform, if they were read already.
   std::shared_ptr<const RigSetup> setup = nullptr;
+  /// The cameras of the given calibration that the recording has, if it has fewer. Empty: all.
+  std::vector<int> cameras;
   TrackerFaults faults;  ///< Faults of the poses of trackers (PoseKind::kPose).
   /// True if the given calibration and hand-eye transform replace those of the recording. If false,
   /// they are used only if the recording has none: the mapping's options replace the others later.

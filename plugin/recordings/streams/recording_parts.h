@@ -121,7 +121,8 @@ struct RecordingParts {
   /// The error of damage after the last of `poses`; empty if there is no damage.
   std::string poses_damage;
 
-  std::vector<Warning> warnings;  ///< Warnings about files that were found and taken.
+  std::vector<Warning> warnings;  ///< Warnings about files and topics that were found and taken.
+  std::vector<RecordedTopic> topics;  ///< All topics of a bag, see `ReaderOptions::lists_topics`.
 
   /// The format's names of its parts, for errors about missing parts: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";
@@ -131,7 +132,7 @@ struct RecordingParts {
 /// Choices that a reader cannot find in the file.
 struct ReaderOptions {
   /// Topics of bags, or names of streams, to read: events (one per camera, in the order of the
-  /// cameras) and poses. Empty: topics are found by their type.
+  /// cameras) and poses ("/tf:world->body" for transforms). Empty: topics are found by their type.
   std::vector<std::string> topics;
   /// The columns of text events and arrays, e.g. "x y p t", with `-` for a column to ignore; or the
   /// names of arrays, fields or data sets: "t=a x=b y=c p=d". Empty: those of the header, else t x
@@ -147,6 +148,8 @@ struct ReaderOptions {
   bool keep_originals = false;  ///< True if poses of a rawlog keep their originals: see PoseSample.
   /// True if `topics` may name topics of other files. Otherwise an unknown name is an error.
   bool topics_of_other_files = false;
+  bool lists_topics = false;      ///< True if `RecordingParts::topics` is needed.
+  bool leaves_out_poses = false;  ///< True if another file gives the poses.
 };
 
 /// A family of formats. A new format is a row of the table in recording_formats.cpp.

@@ -59,7 +59,8 @@ std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
 }  // namespace
 
 bool looksLikeDatasetFolder(const fs::path& folder) {
-  return isFile(folder / "camchain.yaml") || isFile(eventsOf(folder, 0));
+  return isFile(eventsOf(folder, 0)) ||
+         (isFile(folder / "camchain.yaml") && !isFile(eventFileIn(folder)));
 }
 
 RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
@@ -115,8 +116,8 @@ bool looksLikeUzhFolder(const fs::path& folder) { return isFile(eventFileIn(fold
 RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderOptions& options) {
   const fs::path& folder = onlySource(folders, "a folder in the UZH layout");
   RecordingParts parts;
-  parts.expected_calibration = "calib.txt";
-  parts.expected_poses = "groundtruth.txt";
+  parts.expected_calibration = "calib.txt or camchain.yaml";
+  parts.expected_poses = "groundtruth.txt or poses.txt";
   parts.default_size = CameraSize{240, 180};  // the whole dataset was recorded with a DAVIS240C
   auto events = std::make_unique<EventTextStream>(eventFileIn(folder), options);
   if (const auto size = sizeOfImages(folder)) events->setSize(*size);
@@ -129,6 +130,7 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
     parts.poses =
         requirePoses(readPoseText(folder / "groundtruth.txt", options), folder / "groundtruth.txt");
   }
+  addFolderFiles(folder, options, parts);
   return parts;
 }
 

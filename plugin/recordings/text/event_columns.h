@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -98,5 +99,14 @@ std::optional<EventNames> eventNamesOf(const std::string& option);
 
 /// Splits a line into fields, at separators and blanks.
 std::vector<std::string_view> eventFields(std::string_view line, char separator);
+
+/// Returns the text for the expected value of a pixel. @param found the value that is no pixel.
+inline std::string expectedPixel(double found) {
+  std::string expected = "a whole number from 0 to 65535";
+  if (std::floor(found) != found) {
+    expected += "; rectified events have fractions: give them as the sensor wrote them";
+  }
+  return expected;
+}
 
 }  // namespace efm

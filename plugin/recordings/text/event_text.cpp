@@ -243,7 +243,8 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
     const auto pixel = number ? wholeNumber(*number, 0, 65'535) : std::nullopt;
     if (pixel) return static_cast<std::uint16_t>(*pixel);
     throw fail(name, field_of(name[0]),
-               "a whole number from 0 to 65535 (columns in another order: --event-columns)");
+               fmt::format("{} (columns in another order: --event-columns)",
+                           expectedPixel(number.value_or(0))));
   };
   const std::string_view time = field_of('t');
   const std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);

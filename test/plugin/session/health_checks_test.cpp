@@ -157,8 +157,8 @@ TEST(HealthChecks, OtherUnitsOfTimeAreGuessed) {
           of_events
               ? fmt::format("; they fit if the events' times are in {0}: --time-unit {0} (", unit)
               : fmt::format(
-                    "; they fit if the poses' times are in {0}: a header names it, "
-                    "t_{0} tx",
+                    "; they fit if the poses' times are in {0}: --pose-time-unit {0}; or the "
+                    "events' times are in a larger unit",
                     unit);
       EXPECT_THAT(linesOf(warningsOf(recording)), Contains(HasSubstr(expected)));
     }

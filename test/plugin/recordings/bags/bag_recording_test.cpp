@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/bags/bag_recording.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <string>
+#include <tuple>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "test/paths.h"
@@ -188,10 +192,13 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   const auto add_pose = [&](const char* topic, const char* type, std::int64_t t_ns) {
     messages.push_back(poseAt(topic, type, t_ns, RosBytes::kCdr));
   };
-  add_pose("/left/odometry", kOdometry, kStartNs + 1);
-  add_pose("/left/pose", kPose, kStartNs + 2);
+  for (int i = 0; i < 2; ++i) {
+    add_pose("/left/odometry", kOdometry, kStartNs + 1 + i * 10 * kMsNs);
+    add_pose("/left/pose", kPose, kStartNs + 2 + i * 10 * kMsNs);
+  }
   const fs::path one = write("one.mcap", Container::kMcap, messages);
   add_pose("/other/pose", kPose, kStartNs + 3);
+  add_pose("/other/pose", kPose, kStartNs + 3 + 10 * kMsNs);
   const fs::path two = write("two.mcap", Container::kMcap, messages);
 
   struct Case {
@@ -214,11 +221,13 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
     for (const auto& camera : recording.cameras) names.push_back(camera->name());
     for (std::string& name : names) name.erase(0, each.file.string().size() + 2);
     EXPECT_EQ(names, each.cameras);
-    ASSERT_EQ(recording.poses.size(), each.pose_ns == 0 ? 0U : 1U);
-    for (const StampedPose& pose : recording.poses) EXPECT_EQ(pose.t_ns, each.pose_ns);
+    ASSERT_EQ(recording.poses.size(), each.pose_ns == 0 ? 0U : 2U);
+    if (each.pose_ns > 0) {
+      EXPECT_EQ(recording.poses[0].t_ns, each.pose_ns);
+    }
   }
   EXPECT_EQ(open({two}).expected_poses,
-            "the choice of one by --topics, of /left/pose, /other/pose");
+            "the choice of one by --topics, of /left/odometry, /left/pose, /other/pose");
   writeFile(folder() / "json.mcap",
             replaced(mcapBytes(arraysOf("/events", packets, RosBytes::kCdr)), "cdr", "jso"));
   EXPECT_THAT(open({folder() / "json.mcap"}).cameras, IsEmpty()) << "of another encoding";
@@ -231,6 +240,159 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   EXPECT_THAT(errorOf([&] { open({one}, {"/left"}); }),
               AllOf(StartsWith(one.string()), HasSubstr("no topic /left"),
                     HasSubstr("/cam2/events"), HasSubstr("/left/odometry")));
+}
+
+TEST_F(BagRecording, PosesAreOfTheDensestTopicThatCoversTheEvents) {
+  struct PoseTopic {
+    const char* name;
+    const char* type;
+    std::int64_t from_ms, until_ms, period_ms;
+  };
+  const PoseTopic goal = {"/goal", kPose, 40, 41, 1};
+  const PoseTopic mocap = {"/mocap", kPose, 0, 900, 10};
+  const PoseTopic twin = {"/twin", kPose, 0, 900, 10};
+  const PoseTopic sparse = {"/sparse", kPose, 0, 900, 100};
+  const PoseTopic odometry = {"/odom", kOdometry, 0, 900, 10};
+  const PoseTopic fast_odometry = {"/odom", kOdometry, 0, 900, 1};
+  const PoseTopic half = {"/half", kPose, 0, 450, 1};
+  struct Case {
+    std::vector<PoseTopic> topics;
+    std::string expected;  // empty: the choice is asked for
+  };
+  const std::vector<Case> cases = {{{goal, odometry}, "/odom"},   {{sparse, odometry}, "/odom"},
+                                   {{mocap, odometry}, "/mocap"}, {{mocap, fast_odometry}, "/odom"},
+                                   {{half, mocap}, "/mocap"},     {{sparse, mocap, goal}, "/mocap"},
+                                   {{mocap, twin}, ""},           {{mocap}, "/mocap"}};
+  for (const Container container : kContainers) {
+    const RosBytes kind = bytesOf(container);
+    for (const bool events : {true, false}) {
+      for (const Case& each : cases) {
+        RecordedMessages messages;
+        if (events) messages = arraysOf("/events", packetsFrom(kStartNs, 90), kind);
+        std::map<std::string, std::size_t> counts;
+        for (const PoseTopic& topic : each.topics) {
+          for (std::int64_t t_ms = topic.from_ms; t_ms <= topic.until_ms; t_ms += topic.period_ms) {
+            messages.push_back(poseAt(topic.name, topic.type, kStartNs + t_ms * kMsNs, kind));
+            ++counts[topic.name];
+          }
+        }
+        // The index of a bag has the times of its chunks: this short bag may have one alone.
+        const bool is_one = container == Container::kRos1 && each.topics[0].name == half.name;
+        if (is_one) continue;
+        const RecordingParts parts = open({write("bag", container, together(messages, {}))});
+        const std::size_t expected = each.expected.empty() ? 0 : counts[each.expected];
+        EXPECT_EQ(parts.poses.size(), expected) << each.expected;
+        if (each.topics.size() == 1) {
+          EXPECT_THAT(parts.warnings, IsEmpty());
+          continue;
+        }
+        ASSERT_EQ(parts.warnings.size(), 1U);
+        EXPECT_EQ(parts.warnings[0].name, "pose-topic");
+        for (const PoseTopic& topic : each.topics) {
+          EXPECT_THAT(parts.warnings[0].text, HasSubstr(topic.name));
+        }
+        EXPECT_THAT(parts.warnings[0].text,
+                    StartsWith(expected == 0 ? "no poses: expected the choice of one by --topics"
+                                             : "the poses are those of " + each.expected + ","));
+      }
+    }
+  }
+}
+
+TEST_F(BagRecording, TopicsMayBeThoseOfEventsInOneBagAndOfPosesInAnother) {
+  RecordingSource source;
+  source.files = {write("events", Container::kMcap,
+                        arraysOf("/events", packetsFrom(kStartNs, 2), RosBytes::kCdr))};
+  RecordedMessages poses;
+  for (int i = 0; i < 4; ++i) {
+    for (const char* topic : {"/a", "/b"}) {
+      poses.push_back(poseAt(topic, kPose, kStartNs + i * 10 * kMsNs, RosBytes::kCdr));
+    }
+  }
+  source.poses = write("poses", Container::kMcap, poses);
+  source.complete = false;
+  EXPECT_THAT(errorOf([&] { openRecording(source); }), HasSubstr("--topics, of /a, /b"));
+  source.reader.topics = {"/events", "/b"};
+  EXPECT_EQ(openRecording(source)->rig().cameras.size(), 1U);
+  writeFile(folder() / "poses.txt", "0 0 0 0 0 0 0 1\n");
+  source.poses = folder() / "poses.txt";
+  EXPECT_THAT(errorOf([&] { openRecording(source); }), HasSubstr("no topic /b with events"));
+}
+
+TEST_F(BagRecording, TopicsHaveTheNumberAndTimesOfTheirMessages) {
+  for (const Container container : kContainers) {
+    const RosBytes kind = bytesOf(container);
+    RecordedMessages messages = arraysOf("/b/events", packetsFrom(kStartNs, 20), kind);
+    messages.push_back({"/a", "any_msgs/Any", kStartNs + 40 * kMsNs, "any bytes"});
+    messages = together(messages, {});
+    const auto half = messages.begin() + 10;
+    ReaderOptions options;
+    options.lists_topics = true;
+    const fs::path first = write("a", container, {messages.begin(), half});
+    const fs::path second = write("b", container, {half, messages.end()});
+    const auto topics = openBags({second, first}, options).topics;
+    ASSERT_EQ(topics.size(), 2U);
+    const auto text = [](const RecordedTopic& topic) {
+      return fmt::format("{} {} {} {} {}", topic.name, topic.type, topic.messages,
+                         (topic.from_ns - kStartNs) / kMsNs, (topic.until_ns - kStartNs) / kMsNs);
+    };
+    EXPECT_THAT(text(topics[0]), StartsWith("/a any_msgs/Any 1 "));
+    EXPECT_LE(topics[0].from_ns, kStartNs + 40 * kMsNs) << "of its chunk";
+    EXPECT_GE(topics[0].until_ns, kStartNs + 40 * kMsNs);
+    EXPECT_EQ(text(topics[1]), "/b/events dvs_msgs/EventArray 20 12 202");
+  }
+}
+
+TEST_F(BagRecording, TransformsGiveThePosesOfAFrame) {
+  const Rigid3 T_world_odom = {Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {1, 0, 0}};
+  const Rigid3 T_base_cam = {Eigen::Quaterniond(0, 1, 0, 0), {0, 2, 0}};
+  const auto moving = [](int i) {
+    return Rigid3{Eigen::Quaterniond(0.8, 0, 0.6, 0), {0.1 * i, 0.2, 3}};
+  };
+  for (const Container container : kContainers) {
+    const RosBytes kind = bytesOf(container);
+    const auto message = [&](const char* topic, const char* parent, const char* child,
+                             std::int64_t t_ns, const Rigid3& T) {
+      RosMessage transforms(kind);
+      transforms.u32(1).header(t_ns, parent).text(child).pose(T);
+      return RecordedMessage{topic, "tf2_msgs/TFMessage", std::max(t_ns, kStartNs),
+                             transforms.bytes()};
+    };
+    // As trees of frames are: constant transforms once, or again and again in /tf.
+    RecordedMessages messages = {message("/tf_static", "base", "cam", 0, T_base_cam)};
+    for (int i = 0; i < 10; ++i) {
+      const std::int64_t t_ns = kStartNs + i * 10 * kMsNs;
+      messages.push_back(message("/tf", "odom", "/base", t_ns, moving(i)));
+      messages.push_back(message("/tf", "/world", "odom", t_ns, T_world_odom));
+      messages.push_back(message("/tf", "cam", "wheel", t_ns, moving(3 * i)));
+    }
+    const fs::path file = write("bag", container, messages);
+    for (const auto& [frames, T_world_a, T_b_body, backward] :
+         std::vector<std::tuple<std::string, Rigid3, Rigid3, bool>>{
+             {"odom->base", {}, {}, false},
+             {"world->cam", T_world_odom, T_base_cam, false},
+             {"cam->world", T_base_cam.inverse(), T_world_odom.inverse(), true}}) {
+      const RecordingParts parts = open({file}, {"/tf:" + frames});
+      ASSERT_EQ(parts.poses.size(), 10U) << frames;
+      for (int i = 0; i < 10; ++i) {
+        const StampedPose& pose = parts.poses[static_cast<std::size_t>(i)];
+        const Rigid3 T = T_world_a * (backward ? moving(i).inverse() : moving(i)) * T_b_body;
+        EXPECT_EQ(pose.t_ns, kStartNs + i * 10 * kMsNs);
+        EXPECT_LT(differenceOf(T.inverse() * pose.T_world_rig).norm(), 1e-12) << frames;
+      }
+    }
+    const std::string frames =
+        "base->cam (constant), cam->wheel, odom->base, world->odom (constant)";
+    const RecordingParts none = open({file});
+    EXPECT_THAT(none.poses, IsEmpty());
+    EXPECT_THAT(none.expected_poses, HasSubstr("--topics \"/tf:PARENT->CHILD\", of " + frames));
+    for (const char* wrong : {"/tf:world->wheel", "/tf:nowhere->cam", "/tf:cam", "/tf:"}) {
+      EXPECT_THAT(errorOf([&] { open({file}, {wrong}); }),
+                  AllOf(StartsWith(std::string("--topics ") + wrong), HasSubstr("of " + frames)));
+    }
+    EXPECT_THAT(errorOf([&] { open({file}, {"/other:world->cam"}); }),
+                HasSubstr("no topic /other"));
+  }
 }
 
 TEST_F(BagRecording, OneCameraHasItsCalibrationFromCameraInfo) {

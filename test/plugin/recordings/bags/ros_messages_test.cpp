@@ -198,11 +198,38 @@ TEST(RosMessages, PosesComeFromAllTypes) {
       message.header(1'700'000'000'000'000'001, "map");
       if (each.child_frame) message.text("base");
       message.pose(T).numbers(std::vector<double>(static_cast<std::size_t>(each.more)));
-      const StampedPose pose = decodePose(messageOf(message.bytes(), kind), type);
+      const StampedPose pose = decodePoses(messageOf(message.bytes(), kind), type).at(0);
       EXPECT_EQ(pose.t_ns, 1'700'000'000'000'000'001);
       EXPECT_TRUE(isSame(pose.T_world_rig, T)) << each.name;
     }
   }
+}
+
+TEST(RosMessages, PathsAndTransformsHaveManyPoses) {
+  const Rigid3 T = {Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1.25, -2, 3}};
+  for (const RosBytes kind : kKinds) {
+    RosMessage path(kind);
+    path.header(9, "map").u32(2).header(1, "map").pose(T).header(2, "m").pose({});
+    const auto poses = decodePoses(messageOf(path.bytes(), kind), rosTypeOf("nav_msgs/Path"));
+    ASSERT_EQ(poses.size(), 2U);
+    EXPECT_TRUE(poses[0].t_ns == 1 && isSame(poses[0].T_world_rig, T));
+    EXPECT_TRUE(poses[1].t_ns == 2 && isSame(poses[1].T_world_rig, {}));
+
+    RosMessage message(kind);  // a wrong transform between two right ones
+    message.u32(3).header(1, "/map").text("base").pose(T).header(2, "m").text("odd");
+    message.numbers(std::vector<double>(7)).header(3, "map").text("/base").pose(T);
+    const auto transforms = decodeTransforms(messageOf(message.bytes(), kind));
+    ASSERT_EQ(transforms.size(), 3U);
+    for (const std::size_t i : {0, 2}) {
+      EXPECT_EQ(transforms[i].parent + " " + transforms[i].child, "map base");
+      EXPECT_TRUE(isSame(rigidOf(transforms[i].numbers), T));
+    }
+    EXPECT_THAT(errorOf([&] { rigidOf(transforms[1].numbers); }),
+                HasSubstr("orientation of length 0"));
+    EXPECT_EQ(transforms[2].t_ns, 3);
+  }
+  EXPECT_EQ(rosTypeOf("tf2_msgs/TFMessage"), RosType::kTransforms);
+  EXPECT_EQ(rosTypeOf("tf/tfMessage"), RosType::kTransforms);
 }
 
 TEST(RosMessages, CameraInfoGivesTheModel) {
@@ -243,7 +270,7 @@ TEST(RosMessages, WrongValuesAreErrors) {
     decodeMonoEvents(decodeEventPacket(messageOf(bytes, RosBytes::kRos1)), events);
   };
   const auto pose = [](const std::string& bytes) {
-    decodePose(messageOf(bytes, RosBytes::kRos1), RosType::kPose);
+    decodePoses(messageOf(bytes, RosBytes::kRos1), RosType::kPose);
   };
   const auto cdr = [&](const std::string& bytes) {
     decodeEventArray(messageOf(bytes, RosBytes::kCdr), events);

@@ -4,11 +4,13 @@
 #include <mrpt/img/TStereoCamera.h>
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DQuat.h>
+#include <opencv2/core.hpp>
 
 #include <filesystem>
 #include <iterator>
 #include <utility>
 
+#include "mapping/base/number_bytes.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "test/paths.h"
@@ -17,6 +19,7 @@
 namespace efm {
 namespace {
 
+using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 
@@ -79,7 +82,8 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
   EXPECT_NO_THROW(calibration.requireLike(recorded));
   recorded.cameras.pop_back();
   EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }),
-              EndsWith("given.txt: 2 cameras: expected 1, as the recording has"));
+              AllOf(HasSubstr("given.txt: 2 cameras: expected 1, as the recording has; `map "),
+                    EndsWith("--set rig.cameras=1` takes the camera 1")));
   EXPECT_THAT(messageOf([&] { calibration.camera(2, std::nullopt); }),
               HasSubstr("given.txt: 2 cameras, but the recording has camera 2: expected one"));
 }
@@ -129,9 +133,58 @@ TEST_F(CalibrationFile, MayBeOfAnotherProgram) {
         std::string("217.24 217.34 163.3 82.8 -0.0675 0.021 0.0034 0.0016 0.0974\n320 180\n")}) {
     EXPECT_EQ(read(text).rig.cameras.at(0).model, expected) << text;
   }
+  // Four coefficients, and a fifth one of 0.
+  expected.coefficients = {-0.0675, 0.021, 0.0034, 0.0016};
+  const std::string size = "width: 320\nheight: 180\n";
+  const std::string projection = "image_width: 320\nimage_height: 180\nmodel_type: ";
+  const std::string vins =
+      projection +
+      "PINHOLE\nprojection_parameters: {fx: 217.24, fy: 217.34, cx: 163.3, cy: "
+      "82.8}\ndistortion_parameters: {k1: -0.0675, k2: 0.021, p1: 0.0034, p2: "
+      "0.0016}\n";
+  const std::string k = ": [217.24, 0, 163.3, 0, 217.34, 82.8, 0, 0, 1]\n";
+  const std::string d = ": [-0.0675, 0.021, 0.0034, 0.0016]\ndistortion_model: plumb_bob\n";
+  for (const std::string& text : {vins, size + "K" + k + "D" + d, size + "k" + k + "d" + d}) {
+    EXPECT_EQ(read(text).rig.cameras.at(0).model, expected) << text;
+  }
+  expected.distortion = DistortionModel::kEquidistant;
+  EXPECT_EQ(read(projection +
+                 "KANNALA_BRANDT\nprojection_parameters: {k2: -0.0675, k3: 0.021, k4: 0.0034, k5: "
+                 "0.0016, mu: 217.24, mv: 217.34, u0: 163.3, v0: 82.8}\n")
+                .rig.cameras.at(0)
+                .model,
+            expected);
   EXPECT_EQ(read(dv).rig.cameras.at(1).T_rig_cam.translation, Eigen::Vector3d(0.1, 0, 0));
   EXPECT_THAT(errorOfText(replaced(dv, "radialTangential", "fov")),
-              HasSubstr("distortionModel = 'fov': expected radialTangential or equidistant"));
+              HasSubstr("distortionModel = 'fov': expected radtan (plumb_bob, radialTangential, "
+                        "PINHOLE), equidistant (fisheye, kannala_brandt, kb4) or none"));
+}
+
+TEST_F(CalibrationFile, MayBeXmlOfOpencv) {
+  const std::filesystem::path file = folder() / "opencv.xml";
+  CameraModel expected{320, 180, 217.24, 217.34, 163.3, 82.8, DistortionModel::kRadtan, {}};
+  expected.coefficients = {-0.0675, 0.021, 0.0034, 0.0016, 0.0974};
+  {
+    cv::FileStorage storage(file.string(), cv::FileStorage::WRITE);
+    storage << "image_width" << 320 << "image_height" << 180 << "camera_matrix"
+            << cv::Mat(cv::Matx33d(217.24, 0, 163.3, 0, 217.34, 82.8, 0, 0, 1))
+            << "distortion_coefficients" << cv::Mat(expected.coefficients);
+  }
+  EXPECT_EQ(readCalibration(file).rig.cameras.at(0).model, expected);
+  EXPECT_THAT(errorOfText("<?xml version=\"1.0\"?>\n<opencv_storage><a>"),
+              HasSubstr("given.txt: not XML of OpenCV"));
+}
+
+TEST_F(CalibrationFile, OfMoreCamerasGivesTheNamedOnes) {
+  const Calibration chain = read(kCamchain);
+  const Rig one = chain.of(1, {1}).rig;
+  ASSERT_EQ(one.cameras.size(), 1U);
+  EXPECT_EQ(one.cameras[0].model, chain.rig.cameras[1].model);
+  EXPECT_EQ(one.cameras[0].T_rig_cam.translation, Eigen::Vector3d(0.1, 0, 0)) << "on camera 0";
+  for (const std::vector<int>& wrong : {std::vector<int>{}, {2}, {-1}, {0, 1}}) {
+    EXPECT_EQ(chain.of(1, wrong).rig.cameras.size(), 2U);
+  }
+  EXPECT_EQ(chain.of(2, {1}).rig.cameras.size(), 2U) << "the recording has all";
 }
 
 TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
@@ -177,7 +230,7 @@ constexpr const char* kTumVie = R"({"value0": {
 {"camera_type": "kb4", "intrinsics": {"fx": 50, "fy": 51, "cx": 32, "cy": 24,
 "k1": 1, "k2": 2, "k3": 3, "k4": 4}},
 {"camera_type": "kb5", "intrinsics": {}}],
-"T_imu_cam": [{}, {}, {"px": 1, "py": 2, "pz": 3, "qx": 0, "qy": 0, "qz": 1.0011, "qw": 0}]}})";
+"T_imu_cam": [{}, {}, {"px": 1, "py": 2, "pz": 3, "qx": 0, "qy": 0, "qz": 1.011, "qw": 0}]}})";
 
 TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
   const std::string ini =
@@ -198,12 +251,10 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {R"({"value0": {"T_imu_marker": {"px": 1}}})", "given.txt:1: value0: resolution is missing"},
       {R"({"value0": {"resolution": [[1, 2]]}})",
        "value0: resolution = a list: expected 4 rows of 2 numbers"},
-      {kTumVie, "value0: T_imu_cam[2]: qx qy qz qw of length 1.0011: expected a rotation"},
-      {replaced(kTumVie, "1.0011", "1.0009"),
-       "value0: intrinsics[3]: camera_type = 'kb5': expected"},
-      {replaced(replaced(kTumVie, "1.0011", "1"), "kb5", "kb4"),
-       "intrinsics[3]: intrinsics: fx is"},
-      {replaced(replaced(kTumVie, "1.0011", "1"),
+      {kTumVie, "value0: T_imu_cam[2]: qx qy qz qw of length 1.011: expected a rotation"},
+      {replaced(kTumVie, "1.011", "1.009"), "value0: intrinsics[3]: camera_type = 'kb5': expected"},
+      {replaced(replaced(kTumVie, "1.011", "1"), "kb5", "kb4"), "intrinsics[3]: intrinsics: fx is"},
+      {replaced(replaced(kTumVie, "1.011", "1"),
                 ",\n{\"camera_type\": \"kb5\", \"intrinsics\": {}}", ""),
        "value0: intrinsics = a list: expected a list of at least 4 items"},
       {replaced(kTumVie, "[64, 48]", "[64, 65536]"),
@@ -212,7 +263,7 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"intrinsics: {cam0: 3}\nextrinsics: {}\n", "intrinsics: cam0: expected keys and values"},
       {"intrinsics: {}\nextrinsics: {}\n", "intrinsics: cam0 is missing"},
       {replaced(kCameraInfo, "plumb_bob", "rational_polynomial"),
-       "given.txt:5: distortion_model = 'rational_polynomial': expected plumb_bob, equidistant"},
+       "given.txt:5: distortion_model = 'rational_polynomial': expected radtan"},
       {replaced(kCameraInfo, "133, 0, 0, 1]", "133, 0, 0]"),
        ":4: camera_matrix: data: 8 numbers: expected 9, fx 0 cx"},
       {replaced(kCameraInfo, "260", "260.5"), "image_height = 260.5: expected whole numbers"},
@@ -223,12 +274,12 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {replaced(ini, "fx = 50\n", ""), "given.txt: 0 sections with fx: expected one camera"},
       {replaced(ini, "cx = 32\n", ""), "[A_LEFT]: cx is missing"},
       {replaced(ini, "[64 48]", "[]"), "[A_LEFT]: resolution: 0 numbers: expected 2, width height"},
-      {replaced(ini, "none", "fov"), "[A_LEFT]: distortion = 'fov': expected none, plumb_bob"},
+      {replaced(ini, "none", "fov"), "[A_LEFT]: distortion = 'fov': expected radtan"},
       {ini + replaced(ini, "A_LEFT", "B_RIGHT"), "2 sections with fx: expected one camera, or"},
       {ini + replaced(ini, "A_LEFT", "A_RIGHT"), "given.txt: [A_LEFT2RIGHT_POSE] is missing"},
       {ini + replaced(ini, "A_LEFT", "A_RIGHT") +
-           "[A_LEFT2RIGHT_POSE]\npose_quaternion = [1 0 0 0 0 1.0011 0]\n",
-       "[A_LEFT2RIGHT_POSE]: pose_quaternion = a quaternion of length 1.0011: expected a rotation"},
+           "[A_LEFT2RIGHT_POSE]\npose_quaternion = [1 0 0 0 0 1.011 0]\n",
+       "[A_LEFT2RIGHT_POSE]: qx qy qz qw of length 1.011: expected a rotation"},
       {replaced(ini, "none", "plumb_bob\ndist = [1 0 0 0 0 0 0 2]"),
        "number of distortion coefficients = 8: must be 4 or 5"},
   };
@@ -348,8 +399,6 @@ TEST_F(DatasetCalibration, TumViesHandEyeTransformIsThatOfTheMarkerAndTheImu) {
   expectNear(T_imu_marker * T_marker_rig, *calibration.T_imu_rig, 1e-12);
 }
 
-using testing::AllOf;
-
 class HandEyeFile : public TemporaryFolder {
  protected:
   Rigid3 read(const std::string& text) const {
@@ -368,6 +417,30 @@ TEST_F(HandEyeFile, GivesTheTransformFromTheRigToTheBody) {
       "- [0, 0, 0, 1]\nnote: other keys do not matter\n");
   EXPECT_LT((T_body_rig * Eigen::Vector3d(0, 0, 2) - Eigen::Vector3d(2.4, 0.2, -0.1)).norm(),
             1e-12);
+}
+
+TEST_F(HandEyeFile, MayBeANumpyArrayOrTextOfTheMatrix) {
+  const Eigen::Vector3d expected(2.4, 0.2, -0.1);
+  for (const char* text :
+       {"0 0 1 0.4\n-1 0 0 0.2\n0 -1 0 -0.1\n0 0 0 1\n",
+        "[[ 0.  0.  1.  0.4]\n [-1.  0.  0.  0.2]\n [ 0. -1.  0. -0.1]\n [ 0.  0.  0.  1. ]]\n",
+        "# np.savetxt\n0e0,0,1e+00,4e-01\n-1,0,0,0.2\n0,-1,0,-0.1\n0,0,0,1\n"}) {
+    EXPECT_LT((read(text) * Eigen::Vector3d(0, 0, 2) - expected).norm(), 1e-12) << text;
+  }
+  std::string npy("\x93NUMPY\1\0", 8);
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (4, 4), }";
+  header.resize(117, ' ');
+  appendLittleEndian(npy, std::uint16_t{118});
+  npy += header + "\n";
+  const std::string begin = npy;
+  for (const double value : {0., 0., 1., .4, -1., 0., 0., .2, 0., -1., 0., -.1, 0., 0., 0., 1.}) {
+    appendLittleEndian(npy, value);
+  }
+  EXPECT_LT((read(npy) * Eigen::Vector3d(0, 0, 2) - expected).norm(), 1e-12);
+  EXPECT_THAT(errorOfText(begin), HasSubstr("T_body_rig is missing"));
+  EXPECT_THAT(errorOfText(replaced(npy, "False", "True ")), HasSubstr("hand_eye.yaml: "));
+  EXPECT_THAT(errorOfText("0 0 1 0.4\n-1 0 0 0.2\n0 -1 0 -0.1\n0 0 0 2\n"),
+              HasSubstr("a 4x4 matrix: expected a rotation and a last row 0 0 0 1"));
 }
 
 TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
@@ -394,8 +467,9 @@ TEST_F(HandEyeFile, OfEasyHandEyeIsThatOfACameraOnTheHand) {
             1e-12);
   EXPECT_THAT(errorOfText(replaced(text, "true", "false")),
               HasSubstr("parameters: eye_on_hand = 'false': expected true: a camera on the"));
+  writeFile(folder() / "T.npz", "PK\3\4");
   EXPECT_THAT(errorOf([&] { readHandEye(folder() / "T.npz"); }),
-              HasSubstr("T.npz: a NumPy file: expected YAML"));
+              HasSubstr("T.npz: an archive, as .npz of NumPy: expected YAML"));
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {
@@ -413,9 +487,9 @@ TEST_F(HandEyeFile, OfADataSetNeedsItsCalibration) {
       R"({"value0": {"T_imu_marker": {"px": 0, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}}})";
   EXPECT_THAT(errorOfText(marker), HasSubstr("camera-calibration*.json"));
   EXPECT_THAT(errorOfText(R"({"value0": {"T_imu_marker": {"px": 0}}})"),
-              AllOf(HasSubstr("value0: T_imu_marker: q"), HasSubstr(" is missing")));
-  EXPECT_THAT(errorOfText(replaced(marker, R"("qx": 0)", R"("qx": 0.0458)")),  // norm 1.00105
-              HasSubstr("T_imu_marker: qx qy qz qw of length 1.00105: expected a rotation"));
+              HasSubstr("value0: T_imu_marker: py is missing"));
+  EXPECT_THAT(errorOfText(replaced(marker, R"("qx": 0)", R"("qx": 0.145)")),  // norm 1.0105
+              HasSubstr("T_imu_marker: qx qy qz qw of length 1.01046: expected a rotation"));
 }
 
 }  // namespace

@@ -143,6 +143,27 @@ TEST_F(EventArrays, TimesKeepTheDigitsThatTheirTypeHolds) {
             (Times{5'000, 4'000'000'000'000}));
 }
 
+TEST_F(EventArrays, AnArchiveMayHaveTheCamerasCalibration) {
+  const std::string ones = npyArray("|u1", "(2,)", std::vector<std::uint8_t>{1, 1});
+  const std::string matrix = npyArray<double>("<f8", "(3, 3)", {500, 0, 320, 0, 501, 240, 0, 0, 1});
+  std::vector<std::pair<std::string, std::string>> members = {
+      {"t.npy", npyArray("<f8", "(2,)", std::vector<double>{0.5, 1.25})},
+      {"x.npy", ones},
+      {"y.npy", ones},
+      {"p.npy", ones},
+      {"K.npy", matrix}};
+  writeZip(folder() / "e.npz", members);
+  EXPECT_FALSE(openEventArrays({folder() / "e.npz"}, {}).calibration) << "without D";
+  members.emplace_back("D.npy", npyArray<double>("<f8", "(1, 4)", {0.1, 0.2, 0.3, 0.4}));
+  writeZip(folder() / "e.npz", members);
+  const RecordingParts parts = openEventArrays({folder() / "e.npz"}, {});
+  ASSERT_TRUE(parts.calibration);
+  CameraModel expected{346, 260, 500, 501, 320, 240, DistortionModel::kRadtan, {}};
+  expected.coefficients = {0.1, 0.2, 0.3, 0.4};
+  EXPECT_EQ(parts.calibration->camera(0, CameraSize{346, 260}).model, expected);
+  EXPECT_EQ(readStream(*parts.cameras.at(0)).size(), 2U);
+}
+
 TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
   const std::vector<double> ten(40, 1.0);
   const std::string expected = ": expected events: N x 4 numbers, a structured array with";
@@ -168,6 +189,9 @@ TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
                 std::vector<double>{0, 65'535, 0, -1, 0, 0, 65'535, 0, 0, 65'536, 0, 1}),
        ": row 2: x = 65536: expected a whole number from 0 to 65535", 2},
       {npyArray("<f8", "(1, 4)", std::vector<double>{0, 0, -1, 1}), ": row 0: y = -1: expected"},
+      {npyArray("<f8", "(1, 4)", std::vector<double>{0.5, 7, 1.25, 1}),
+       ": row 0: y = 1.25: expected a whole number from 0 to 65535; rectified events have "
+       "fractions"},
       {npyArray("<f8", "(2, 4)", std::vector<double>{0.5, 1, 2, 2, 0.6, 1, 2, 1}),
        ": row 0: p = 2: expected polarity 0 or 1, or -1 or 1"},
       {npyArray("<f4", "(2, 4)", std::vector<float>{16'383.5F, 1, 2, 1, 16'384, 1, 2, 1}),

@@ -421,6 +421,25 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
               HasSubstr("events.h5:/a/list/u: no such data set (--event-columns)"));
 }
 
+TEST_F(Hdf5Events, AnOrderOfTheOptionIsThatOfAnNByFourDataSet) {
+  ASSERT_EQ(std::system(("/usr/bin/python3 -c 'import h5py, numpy as np; "
+                         "h5py.File(\"" +
+                         file().string() +
+                         "\", \"w\")[\"events\"] = np.array([[5, 7, 8, 1], [6, 9, 8, 0]])'")
+                            .c_str()),
+            0);
+  ReaderOptions options;
+  options.columns = "t x y p";
+  options.time_unit = "us";
+  EXPECT_THAT(readStream(*openHdf5({file()}, options).cameras.at(0)),
+              ElementsAre(Event{5'000, 7, 8, true}, Event{6'000, 9, 8, false}));
+  options.columns = "t=events x=events y=events p=events";
+  EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
+              HasSubstr(":/events: N x 4 numbers: expected a list; for an N x 4 data set /events"));
+  options.columns = "p t y x";
+  EXPECT_NE(errorOf([&] { readStream(*openHdf5({file()}, options).cameras.at(0)); }), "no error");
+}
+
 TEST(Hdf5CrashNote, EndsAProgramWithTheNameOfTheFileAndNoHost) {
   const auto call = [](bool in_program, const std::function<void()>& library) {
     if (in_program) Hdf5CrashNote::enable();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -138,15 +139,13 @@ TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid)
   EXPECT_THAT(opened.warnings, testing::ElementsAre(said("my rig.yaml", "--calibration"),
                                                     said("tracker.csv", "--poses")));
   write("other.yaml", kCamera);
-  EXPECT_THAT(
-      errorOf({folder()}),
-      HasSubstr("no calibration: expected calib.txt (not clear: my rig.yaml, other.yaml), or "
-                "--calibration FILE"));
+  EXPECT_THAT(errorOf({folder()}), HasSubstr("no calibration: expected calib.txt or camchain.yaml "
+                                             "(not clear: my rig.yaml, other.yaml), or "
+                                             "--calibration FILE"));
   write("second.txt", "0.1 1 2 3 0 0 0 1\n");
   source.calibration = folder() / "other.yaml";
-  EXPECT_THAT(
-      errorOfSource(source),
-      HasSubstr("no poses: expected groundtruth.txt (not clear: second.txt, tracker.csv), or"));
+  EXPECT_THAT(errorOfSource(source), HasSubstr("no poses: expected groundtruth.txt or poses.txt "
+                                               "(not clear: second.txt, tracker.csv), or"));
   // File names that the layout knows have priority, without a message.
   write("groundtruth.txt", "0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n");
   const Opened known = openedOf(source);
@@ -349,15 +348,29 @@ TEST_F(UzhText, TheSensorHasTheSizeOfTheFirstExistingImageElseThatOfADavis240) {
   EXPECT_THAT(errorOfOpening(), HasSubstr("frame_0.png: cannot be read as an image"));
 }
 
+TEST_F(UzhText, MayHaveACameraChainAndPosesAsOtherFoldersDo) {
+  write("poses.txt", "0 7 2 3 0 0 0 1\n");
+  EXPECT_EQ(openUzhFolder({folder()}, {}).poses.at(0).T_world_rig.translation.x(), 1);
+  for (const char* name : {"calib.txt", "groundtruth.txt"}) remove(name);
+  write("camchain.yaml", kCamera);
+  EXPECT_EQ(detectFormat(folder())->name, "uzh");
+  const auto recording = openAs("auto", folder());
+  EXPECT_EQ(recording->rig().cameras.at(0).model.width, 346);
+  EXPECT_EQ(std::get<PoseSample>(*recording->next()).T_world_body.translation.x(), 7);
+  EXPECT_THAT(recording->counts().warnings, testing::IsEmpty());
+}
+
 TEST_F(UzhText, AMissingFileIsNamed) {
   EXPECT_TRUE(looksLikeUzhFolder(folder()));
   write("groundtruth.txt", "\n");
   EXPECT_THAT(errorOfOpening(), HasSubstr("groundtruth.txt: no poses"));
   remove("groundtruth.txt");
-  EXPECT_THAT(errorOfOpening(), HasSubstr(": no poses: expected groundtruth.txt, or --poses FILE"));
-  remove("calib.txt");
   EXPECT_THAT(errorOfOpening(),
-              HasSubstr(": no calibration: expected calib.txt, or --calibration FILE"));
+              HasSubstr(": no poses: expected groundtruth.txt or poses.txt, or --poses FILE"));
+  remove("calib.txt");
+  EXPECT_THAT(
+      errorOfOpening(),
+      HasSubstr(": no calibration: expected calib.txt or camchain.yaml, or --calibration FILE"));
   remove("events.txt");
   EXPECT_FALSE(looksLikeUzhFolder(folder()));
   EXPECT_FALSE(looksLikeUzhFolder(folder() / "nowhere"));

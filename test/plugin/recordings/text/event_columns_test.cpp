@@ -221,6 +221,8 @@ TEST_F(EventColumnsText, AnErrorNamesTheLineTheColumnAndTheOption) {
   EXPECT_THAT(errorOfText("t,x,y,p\n0.1,1,2,0\n0.2,1,,0\n"), HasSubstr("e.txt:3: y = ''"));
   EXPECT_THAT(errorOfText("x y t p\n1 2 a 0\n"), HasSubstr("e.txt:2: t = 'a': expected a time"));
   EXPECT_THAT(errorOfText("1 2 1 0.5\n"), HasSubstr("--event-columns"));
+  EXPECT_THAT(errorOfText("t x y p\n0.1 1.5 2 0\n"),
+              HasSubstr("x = '1.5': expected a whole number from 0 to 65535; rectified events"));
   EXPECT_THAT(errorOfText("0.1 1 2 0\n240 180\n"), HasSubstr("e.txt:2: '240 180': expected 4"));
   for (const char* wrong : {"x y t", "x y t p p", "x y t q", "t x y p z"}) {
     EXPECT_THAT(errorOfText("0.1 1 2 0\n", ReaderOptions{{}, wrong, {}}),
