@@ -25,6 +25,7 @@ namespace efm {
 namespace {
 
 constexpr const char* kMatrix = "9, fx 0 cx 0 fy cy 0 0 1";
+constexpr const char* kSeven = "7, a position and a quaternion";
 
 /// The names that programs give to the models of lenses.
 constexpr NamedChoice<DistortionModel> kLenses[] = {
@@ -115,7 +116,8 @@ std::vector<double> numbersAt(const YamlEntry& entry, const char* keys, std::siz
     const std::vector<double> list = place.numbers(name.c_str(), 2, "2 numbers");
     all.insert(all.end(), list.begin(), list.end());
   }
-  return all;
+  if (count == 0 || all.size() == count) return all;
+  throw place.fail(fmt::format("{}: {} numbers: expected {}", keys, all.size(), expected));
 }
 
 /// Sets the size of the sensor. @param keys its keys, for errors.
@@ -186,8 +188,7 @@ Rigid3 rigidFrom(const YamlEntry& entry, const std::vector<double>& v) {
   const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
   if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
   throw entry.fail(
-      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 "
-                  "within 1 %",
+      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %",
                   numbers.coeffs().stableNorm()));
 }
 
@@ -297,7 +298,7 @@ Rigid3 readEasyHandEye(const YamlEntry& root) {
                                "true: a camera on the tracked body");
     }
   }
-  return rigidFrom(root, numbersAt(root, "transformation: x y z qx qy qz qw", 7, ""));
+  return rigidFrom(root, numbersAt(root, "transformation: x y z qx qy qz qw", 7, kSeven));
 }
 
 Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::path& file) {
@@ -333,7 +334,7 @@ constexpr Eigen::Index kTumVieCameras = 4;
 constexpr std::size_t kTumVieEventCameras[] = {2, 3};
 
 Rigid3 jsonPose(const YamlEntry& pose) {
-  return rigidFrom(pose, numbersAt(pose, "px py pz qx qy qz qw", 7, ""));
+  return rigidFrom(pose, numbersAt(pose, "px py pz qx qy qz qw", 7, kSeven));
 }
 
 CameraModel kb4Camera(const YamlEntry& value, std::size_t index, const Eigen::MatrixXd& sizes) {

@@ -154,6 +154,8 @@ TEST_F(CalibrationFile, MayBeOfAnotherProgram) {
                 .rig.cameras.at(0)
                 .model,
             expected);
+  EXPECT_THAT(errorOfText(replaced(dv, R"(["217.24", "217.34"])", "217")),
+              HasSubstr("cameras[0]: focalLength principalPoint: 3 numbers: expected 4, fx fy"));
   EXPECT_EQ(read(dv).rig.cameras.at(1).T_rig_cam.translation, Eigen::Vector3d(0.1, 0, 0));
   EXPECT_THAT(errorOfText(replaced(dv, "radialTangential", "fov")),
               HasSubstr("distortionModel = 'fov': expected radtan (plumb_bob, radialTangential, "
