@@ -295,22 +295,24 @@ K : numpy.ndarray, float64, shape (3, 3)
 
 void defineRecordings(py::module_& module) {
   py::class_<RecordingSource>(module, "Source")
-      .def(py::init(
-          [](const Paths& files, std::filesystem::path poses, std::filesystem::path calibration,
-             std::filesystem::path hand_eye, std::string format, std::vector<std::string> topics,
-             std::string event_columns, std::string time_unit, std::string pose_time_unit,
-             std::optional<std::pair<int, int>> sensor_size, std::uint64_t skip_bad_events) {
-            RecordingSource source = sourceOf(
-                files, {std::move(poses), std::move(calibration), std::move(hand_eye), {}});
-            source.format = std::move(format);
-            source.reader.topics = std::move(topics);
-            source.reader.columns = std::move(event_columns);
-            source.reader.time_unit = std::move(time_unit);
-            source.reader.pose_time_unit = std::move(pose_time_unit);
-            if (sensor_size) source.reader.sensor_size = {sensor_size->first, sensor_size->second};
-            source.skip_bad_events = skip_bad_events;
-            return source;
-          }))
+      .def(py::init([](const Paths& files, std::filesystem::path poses,
+                       std::filesystem::path calibration, std::filesystem::path hand_eye,
+                       std::string format, std::vector<std::string> topics,
+                       std::string event_columns, std::string time_unit, std::string pose_time_unit,
+                       std::optional<std::pair<int, int>> sensor_size,
+                       std::uint64_t skip_bad_events, std::vector<int> cameras) {
+        RecordingSource source =
+            sourceOf(files, {std::move(poses), std::move(calibration), std::move(hand_eye), {}});
+        source.format = std::move(format);
+        source.reader.topics = std::move(topics);
+        source.reader.columns = std::move(event_columns);
+        source.reader.time_unit = std::move(time_unit);
+        source.reader.pose_time_unit = std::move(pose_time_unit);
+        if (sensor_size) source.reader.sensor_size = {sensor_size->first, sensor_size->second};
+        source.skip_bad_events = skip_bad_events;
+        source.cameras = std::move(cameras);
+        return source;
+      }))
       .def("set_limits", [](RecordingSource& source, std::optional<std::int64_t> t0_ns,
                             std::optional<std::int64_t> t1_ns) {
         source.limits = {t0_ns, t1_ns};

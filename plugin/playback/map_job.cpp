@@ -43,7 +43,7 @@ RecordingSource MapJob::sourceNow() const {
   now.calibration = options.rig.calibration;
   now.hand_eye = options.rig.hand_eye;
   now.setup = options.rig.setup;
-  now.cameras = options.mapper.cameras;
+  if (!options.mapper.cameras.empty()) now.cameras = options.mapper.cameras;
   now.time_offsets_ns = options.rig.time_offsets_ns;
   now.override_rig = false;  // the mapping applies the options
   PosePerturbationOptions& perturbation = now.faults.perturbation;
@@ -243,14 +243,15 @@ void MapSteps::begin() {
                  job.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure, namesOf(all));
 }
 
-/// If the calibration has more cameras than the recording, leaves those that `[rig] cameras` names:
-/// they are all cameras of the recording.
+/// If the calibration has more cameras than the recording, leaves those that `[rig] cameras` or
+/// the source names: they are all cameras of the recording.
 void MapSteps::takeCalibrationOf(std::size_t count) {
   RigSetup setup = options.rig.setup ? *options.rig.setup : RigSetup();
   if (!setup.calibration || setup.calibration->rig.cameras.size() <= count) return;
-  setup.calibration = setup.calibration->of(count, options.mapper.cameras);
+  calibrated_ = job.sourceNow().cameras;
+  setup.calibration = setup.calibration->of(count, calibrated_);
   options.rig.setup = std::make_shared<RigSetup>(std::move(setup));
-  calibrated_ = std::exchange(options.mapper.cameras, {});
+  options.mapper.cameras.clear();
   first.statistics = RecordingStatistics(statisticsOptions(options));
 }
 

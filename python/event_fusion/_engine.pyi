@@ -70,6 +70,7 @@ class Source:
         pose_time_unit: str,
         sensor_size: Optional[tuple[int, int]],
         skip_bad_events: int,
+        cameras: Sequence[int],
     ) -> None: ...
     def set_limits(self, t0_ns: Optional[int], t1_ns: Optional[int]) -> None: ...
 

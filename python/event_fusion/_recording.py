@@ -123,6 +123,7 @@ def open(
     pose_time_unit: str = "",
     sensor_size: tuple[int, int] | None = None,
     skip_bad_events: int = 0,
+    cameras: Sequence[int] = (),
 ) -> Recording:
     """Open a recording.
 
@@ -138,6 +139,9 @@ def open(
     format, topics, event_columns, time_unit, pose_time_unit, sensor_size, skip_bad_events
         What cannot be found in the files: the options of the command line with these names. `sensor_size` is (width,
         height).
+    cameras : sequence of int
+        The cameras of the calibration that the recording has, if the calibration has more (``rig.cameras``). Poses are
+        those of the calibration's camera 0.
 
     Raises
     ------
@@ -145,7 +149,7 @@ def open(
         If a file cannot be read. It names file, place, value and what was expected. An option that it names, such as
         ``--sensor-size 346x260``, is the argument of that name here: ``sensor_size=(346, 260)``.
     ValueError
-        If a time cannot be read, or t1 is not above t0.
+        If a time cannot be read, t1 is not above t0, or `cameras` has more or fewer numbers than the recording cameras.
     """
     files = [os.fspath(file) for file in ([path] if isinstance(path, (str, os.PathLike)) else path)]
     given = (os.fspath(poses), os.fspath(calibration), os.fspath(hand_eye))
@@ -159,10 +163,14 @@ def open(
         pose_time_unit,
         sensor_size,
         skip_bad_events,
+        list(cameras),
     )
 
     source.set_limits(*times_in(source, t0=t0, t1=t1))
-    return Recording(files, source)
+    recording = Recording(files, source)
+    if cameras and len(cameras) != len(recording.rig):
+        raise ValueError(f"cameras = {list(cameras)}: expected {len(recording.rig)}, as many as the recording has")
+    return recording
 
 
 def simulate(

@@ -178,6 +178,7 @@ ERRORS = {
     "no rotation": (lambda: stereo_mapper().add_pose(0, np.ones((4, 4))), ValueError, "rotation matrix"),
     "no quaternion": (lambda: stereo_mapper().add_pose(0, np.ones(7)), ValueError, "length 1"),
     "no time": (lambda: ef.open(DESK, t0="soon"), ValueError, "t0 = 'soon'"),
+    "too few cameras": (lambda: ef.open(DESK, cameras=[1]), ValueError, r"cameras = \[1\]: expected 2"),
     "an interval backwards": (lambda: ef.open(DESK, t0=5, t1=4), ValueError, "t1"),
     "an unknown preset": (lambda: ef.simulate("desk"), ValueError, "desk_stereo"),
     "a wrong option of a map": (lambda: ef.map(ef.open(DESK), {"dsi.num_planes": -3}), ValueError, "num_planes"),
@@ -337,6 +338,16 @@ def test_events_are_read_without_poses_and_calibration(desk, tmp_path):
         np.testing.assert_allclose(next(alone.events(0, 1000, unit))["t"], part["t"] // per if unit == "us" else part["t"] / per)
     with pytest.raises(OSError, match="--calibration"):
         ef.map(alone).points
+
+
+def test_a_calibration_may_have_more_cameras_than_the_recording(desk, tmp_path):
+    shutil.copy(os.path.join(DESK, "cam1", "events.txt"), tmp_path / "events.txt")
+    given = {"poses": os.path.join(DESK, "poses.txt"), "calibration": os.path.join(DESK, "camchain.yaml"), "t1": "+0.5"}
+    with pytest.raises(ValueError, match=r"Python: cameras=\[1\]"):
+        ef.open(tmp_path / "events.txt", **given)
+    alone = ef.open(tmp_path / "events.txt", **given, cameras=[1])
+    np.testing.assert_array_equal(alone.rig[0].T_rig_cam, desk.rig[1].T_rig_cam)
+    assert len(ef.map(alone).points) > 100
 
 
 def test_times_are_those_of_the_command_line(desk):

@@ -155,8 +155,10 @@ void Calibration::requireCameras(std::size_t count) const {
       "{}: {}: expected {}, as the recording has{}", file.string(), camerasInWords(own), count,
       last.empty()
           ? ""
-          : fmt::format("; `map --calibration {} --set rig.cameras={}` takes the camera {}",
-                        file.string(), last, last)));
+          : fmt::format(
+                "; `map --calibration {} --set rig.cameras={}` (Python: cameras=[{}]) takes "
+                "the camera {}",
+                file.string(), last, last, last)));
 }
 
 void Calibration::requireLike(const Rig& recorded) const {
