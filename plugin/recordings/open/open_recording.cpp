@@ -210,6 +210,7 @@ RecordingParts openParts(const RecordingSource& source) {
     if (all.cameras.empty() && all.poses.empty()) {
       std::swap(all, parts);
     } else {
+      if (!source.calibration.empty()) all.calibration.reset();
       append(std::move(parts), files.front(), all);
     }
   }
@@ -408,7 +409,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   }
   const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
   if (given != nullptr && parts.calibration &&
-      parts.calibration->rig.cameras.size() > parts.cameras.size()) {
+      parts.calibration->rig.cameras.size() != parts.cameras.size()) {
     parts.calibration.reset();
   }
   JoinedParts joined;

@@ -225,6 +225,12 @@ TEST_F(OpenRecording, SourcesThatDoNotFitTogetherAreErrors) {
   EXPECT_EQ(errorOf({uzh, a}), a.string() + ": a second calibration, beside " +
                                    (uzh / "calib.txt").string() +
                                    ": expected one of all cameras, or --calibration FILE");
+  write("all.yaml", twoCamchain());
+  RecordingSource both;
+  both.files = {uzh, a};
+  both.calibration = folder() / "all.yaml";
+  both.complete = false;
+  EXPECT_EQ(openRecording(both)->rig().cameras.size(), 2U);
   EXPECT_EQ(errorOf({a, folder() / "b"}),
             (folder() / "b").string() + ": 2 sources: expected one, a dataset folder");
   EXPECT_EQ(
