@@ -5,15 +5,15 @@
 #   test.sh long [CTEST ARGUMENT…]   the long tests, the benchmarks, the studies; each header compiled alone
 set -euo pipefail
 cd "$(dirname "$0")"
-scripts/install_packages.sh
+scripts/install_packages.sh all
 if [ "${1:-}" = long ]; then
   shift
-  cmake --preset release -DEFM_BUILD_LONG=ON
+  cmake --preset release -DEFM_BUILD_TESTS=ON -DEFM_BUILD_LONG=ON
   cmake --build --preset release
   cmake --build --preset release --target all_verify_interface_header_sets
   ctest --preset release --label-regex long "$@"
 else
-  cmake --preset release -DEFM_BUILD_LONG=OFF
+  cmake --preset release -DEFM_BUILD_TESTS=ON -DEFM_BUILD_LONG=OFF
   cmake --build --preset release
   ctest --preset release --label-exclude long "$@"
 fi

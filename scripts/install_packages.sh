@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs the Debian packages of packages.txt that are missing. Needs root only where some are.
+#   install_packages.sh       what building, the demo and the Python module need
+#   install_packages.sh all   what tests need, too
 set -euo pipefail
 list="$(dirname "$0")/../packages.txt"
 
 missing=()
 while read -r package; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
-done < <(grep -vE '^[[:space:]]*(#|$)' "$list")
+done < <(if [ "${1:-}" = all ]; then cat "$list"; else sed '/^# == Tests/,$d' "$list"; fi |
+  grep -vE '^[[:space:]]*(#|$)')
 
 if [ "${#missing[@]}" -eq 0 ]; then exit 0; fi
 if [ "$(id -u)" -ne 0 ]; then

@@ -304,6 +304,7 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
   PoseVerdict verdict = survey.judgePoses(options.mapper);
   append(report.warnings, std::move(verdict.warnings));
   warnOfNew();
+  append(verdict.notes, held->read().counts().notes);
   for (const Warning& note : verdict.notes) {
     if (job.note) job.note(note.name + ": " + note.text);
   }

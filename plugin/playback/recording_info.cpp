@@ -33,6 +33,7 @@ void judge(FirstLook* look, RecordingInfo& info) {
     }
   }
   append(info.warnings, warningsOf(findings));
+  append(info.notes, info.counts.notes);
 }
 
 /// Adds the number of samples of a stream, and their times.
@@ -111,6 +112,13 @@ std::string infoJson(const RecordingInfo& info) {
     if (topic.from_ns > topic.until_ns) continue;
     added["from_ns"] = topic.from_ns;
     added["until_ns"] = topic.until_ns;
+  }
+  json["transforms"] = Json::array();
+  for (const RecordedTransform& transform : info.counts.transforms) {
+    json["transforms"].push_back({{"parent", transform.parent},
+                                  {"child", transform.child},
+                                  {"moves", transform.moves},
+                                  {"messages", transform.count}});
   }
   json["others"] = info.others;
   json["sorted_events"] = info.counts.sorted_events;

@@ -37,8 +37,8 @@ struct RecordingInfo {
 RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>& progress);
 
 /// Returns the info as JSON: observations, cameras, poses (by source), events_before_poses,
-/// events_after_poses, topics (of bags), others, sorted_events, true_depth_maps, chosen, warnings
-/// and notes.
+/// events_after_poses, topics and transforms (of bags), others, sorted_events, true_depth_maps,
+/// chosen, warnings and notes.
 std::string infoJson(const RecordingInfo& info);
 
 /// Rejects time limits without events: they may be mistyped. A recording without cameras passes.

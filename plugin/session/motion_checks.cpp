@@ -221,6 +221,16 @@ class MotionChecks {
 }  // namespace
 
 void checkMotion(const Findings& findings, std::vector<Warning>& warnings) {
+  const PoseStatistics* const poses = findings.recording.usedPoses();
+  if (const auto conflict = poses != nullptr ? poses->check.conflict() : std::nullopt) {
+    addWarning(
+        warnings, "two-trajectories",
+        "{} of {} {}, first {:.3g} m and {:.3g} degrees apart: the poses of two bodies? Give "
+        "those of one",
+        conflict->count, conflict->of,
+        conflict->equal_times ? "times have poses that differ" : "poses change between two places",
+        conflict->distance_m, conflict->angle_rad / kRadiansPerDegree);
+  }
   MotionChecks(findings, warnings).run();
 }
 

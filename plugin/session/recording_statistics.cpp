@@ -119,7 +119,9 @@ void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
   // In shorter steps, the noise of a tracker with a high rate looks like speed.
   constexpr std::int64_t kMinStepNs = 10'000'000;
   const bool late = poses.last_ns && pose.t_ns <= *poses.last_ns;
+  const bool earlier = poses.last_ns && pose.t_ns < *poses.last_ns;
   poses.add(pose.t_ns, pose.t_ns, 1);
+  if (!earlier) check.add(pose);
   if (late) return;
   motion.add(pose);
   if (!step_begin_) step_begin_ = window_begin_ = pose;

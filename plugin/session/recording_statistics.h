@@ -12,6 +12,7 @@
 
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
+#include "mapping/geometry/trajectory_check.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/pose_motion.h"
 #include "plugin/session/pose_source_selector.h"
@@ -104,6 +105,7 @@ struct PoseStatistics {
   double max_shift_m = 0;        ///< Largest distance from the first pose of a window.
   double max_rotation_rad = 0;   ///< Largest rotation from the first pose of a window.
   PoseMotion motion;
+  TrajectoryCheck check;  ///< Do the poses belong to one body?
 
   void add(const StampedPose& pose, std::int64_t window_ns);
 

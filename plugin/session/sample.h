@@ -91,6 +91,13 @@ struct RecordedTopic {
   }
 };
 
+/// The transforms between two frames of a bag: /tf and /tf_static.
+struct RecordedTransform {
+  std::string parent, child;
+  bool moves = false;
+  std::uint64_t count = 0;
+};
+
 /// Counts of irregular data in a recording that could be read.
 struct RecordingCounts {
   std::uint64_t sorted_events = 0;    ///< Events that came up to 10 ms after a newer event.
@@ -99,7 +106,9 @@ struct RecordingCounts {
   std::uint64_t skipped_events = 0;   ///< Bad events, left out: see `BadEvents`.
   std::string first_skipped;          ///< Error of the first skipped event.
   std::vector<Warning> warnings;      ///< Warnings of the readers: see `EventStream::warnings`.
+  std::vector<Warning> notes;         ///< Notes of the readers, for example of replaced transforms.
   std::vector<RecordedTopic> topics;  ///< Topics of a bag, if they were asked for.
+  std::vector<RecordedTransform> transforms;  ///< As `topics`.
   /// Times of the events nearest to the time limits of reading, on the clock of the poses.
   std::optional<std::int64_t> nearest_before_ns, nearest_after_ns;
 };

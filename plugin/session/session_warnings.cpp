@@ -295,25 +295,13 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
 }
 
 void dropExplainedBlur(std::vector<Warning>& warnings) {
-  constexpr std::string_view kMistakes[] = {"poses-inverted",
-                                            "quaternion-order",
-                                            "cameras-swapped",
-                                            "axis-convention",
-                                            "time-shift",
-                                            "poses-unexplained",
-                                            "depths-disagree",
-                                            "scale",
-                                            "camera-clocks",
-                                            "events-mirrored",
-                                            "sensor-area",
-                                            "long-lever",
-                                            "no-motion",
-                                            "rotation-only",
-                                            "speed",
-                                            "rotation-rate",
-                                            "pose-jump",
-                                            "poses-frozen",
-                                            "pose-interpolation"};
+  constexpr std::string_view kMistakes[] = {
+      "poses-inverted", "quaternion-order",  "cameras-swapped", "axis-convention",
+      "time-shift",     "poses-unexplained", "depths-disagree", "scale",
+      "camera-clocks",  "events-mirrored",   "sensor-area",     "long-lever",
+      "no-motion",      "rotation-only",     "speed",           "rotation-rate",
+      "pose-jump",      "two-trajectories",  "pose-frame",      "camera-frame",
+      "poses-frozen",   "pose-interpolation"};
   const auto isMistake = [&](const Warning& warning) {
     return std::find(std::begin(kMistakes), std::end(kMistakes), warning.name) !=
            std::end(kMistakes);

@@ -8,7 +8,9 @@
 #include <cctype>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -258,19 +260,60 @@ bool isTrigger(const RosTopic& topic) {
 
 std::string beforeThe(const std::string& damage) { return " before the damage (" + damage + ")"; }
 
-/// Reads the transforms between frames. @param most number of messages of each topic to read.
-FrameTree readFrames(const RosTopics& topics, std::int64_t most, std::string& damage) {
-  FrameTree tree;
-  for (const RosTopic& topic : topics) {
-    if (topic.type != RosType::kTransforms) continue;
-    std::int64_t count = 0;
-    const std::string ended = forMessages(topic, [&](const BagMessage& message) {
-      for (const FrameTransform& transform : decodeTransforms(message)) tree.add(transform);
-      return ++count < most;
+/// Returns the frame of a topic's first message; empty if it has none.
+std::string frameOf(const RosTopic& topic) {
+  std::string frame;
+  try {
+    forMessages(topic, [&](const BagMessage& message) {
+      frame = framesOf(message, topic.type).frame;
+      return false;
     });
-    if (damage.empty()) damage = ended;
+  } catch (const std::runtime_error&) {
+    return {};  // the reader of the messages reports the damage
   }
-  return tree;
+  return frame;
+}
+
+/// Returns the transforms of topics, which must outlive the tree.
+FrameTree treeOf(const RosTopics& topics) {
+  return FrameTree([&topics](const FrameTree::Take& take) {
+    std::string damage;
+    for (const RosTopic& topic : topics) {
+      if (topic.type != RosType::kTransforms) continue;
+      const bool latched = topic.name.find("tf_static") != std::string::npos;
+      const std::string ended = forMessages(topic, [&](const BagMessage& message) {
+        for (const FrameTransform& transform : decodeTransforms(message)) take(transform, latched);
+        return true;
+      });
+      if (damage.empty()) damage = ended;
+    }
+    return damage;
+  });
+}
+
+/// Says why the poses of a path are no trajectory; std::nullopt if they may be one. A planner's
+/// poses have the time of their message, or none, or they lie ahead.
+std::optional<std::string> whyNoTrajectory(const RosTopic& topic) {
+  constexpr int kMostMessages = 20;  // the first paths may have one pose
+  constexpr std::int64_t kAheadNs = 100'000'000;
+  std::optional<std::string> why;
+  int count = 0;
+  if (topic.type != RosType::kPath) return why;
+  try {
+    forMessages(topic, [&](const BagMessage& message) {
+      std::int64_t stamp_ns;
+      const std::vector<PathPose> poses = decodePath(message, stamp_ns);
+      if (poses.size() > 1 && poses.front().t_ns == poses.back().t_ns) {
+        why = "its poses have no times of their own";
+      } else if (!poses.empty() && stamp_ns > 0 && poses.back().t_ns > stamp_ns + kAheadNs) {
+        why = "its poses lie ahead of the time of their message";
+      }
+      return !why && ++count < kMostMessages;
+    });
+  } catch (const std::runtime_error&) {
+    return std::nullopt;  // the reader of the poses reports the damage
+  }
+  return why;
 }
 
 /// Returns the topic with the most messages per second of those that cover the events.
@@ -309,39 +352,172 @@ const RosTopic* densest(const RosTopics& candidates, const RosTopics& cameras) {
   return rated.empty() || alike ? nullptr : rated[0].topic;
 }
 
+/// Reads the poses of paths. A later path corrects the times that it has.
+std::string readPaths(const RosTopic& topic, std::vector<StampedPose>& poses) {
+  std::map<std::int64_t, PoseNumbers> by_time;
+  std::vector<PathPose> last;
+  std::string damage = forMessages(topic, [&](const BagMessage& message) {
+    std::int64_t stamp_ns;
+    std::vector<PathPose> path = decodePath(message, stamp_ns);
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const bool same = i < last.size() && path[i].t_ns == last[i].t_ns &&
+                        path[i].numbers == last[i].numbers;  // most paths grow at their end
+      if (!same) by_time[path[i].t_ns] = path[i].numbers;
+    }
+    last = std::move(path);
+    return true;
+  });
+  for (const auto& [t_ns, numbers] : by_time) {
+    try {
+      poses.push_back({t_ns, rigidOf(numbers)});
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("{}: {}: pose of {}: {}",
+                                           topic.parts.front().bag->file().string(), topic.name,
+                                           formatSeconds(t_ns), error.what()));
+    }
+  }
+  return damage;
+}
+
+/// Poses of a bag, and their frames as the messages name them.
+struct FramedPoses {
+  std::string name;  // of the topic
+  FrameMotion T_world_body;
+  MessageFrames frames;
+  bool is_transform = false;  // geometry_msgs/TransformStamped
+};
+
+std::string readPoses(const RosTopic& topic, FramedPoses& poses) {
+  poses.name = topic.name;
+  poses.is_transform = topic.type == RosType::kTransform;
+  if (topic.type == RosType::kPath) {
+    poses.frames.frame = frameOf(topic);
+    return readPaths(topic, poses.T_world_body.moves);
+  }
+  bool first = true;
+  return forMessages(topic, [&](const BagMessage& message) {
+    const MessageFrames frames = framesOf(message, topic.type);
+    if (std::exchange(first, false)) poses.frames = frames;
+    if (frames != poses.frames) {
+      throw std::runtime_error(fmt::format(
+          "poses of {} in {} beside poses of {} in {}: expected one body in one world frame",
+          inQuotes(frames.child), inQuotes(frames.frame), inQuotes(poses.frames.child),
+          inQuotes(poses.frames.frame)));
+    }
+    for (const StampedPose& pose : decodePoses(message, topic.type)) {
+      poses.T_world_body.moves.push_back(pose);
+    }
+    return true;
+  });
+}
+
+/// Joins the poses' frame to the frame of camera 0's events, as far as the transforms tell.
+void joinFrames(const FrameTree& tree, const std::string& camera, FramedPoses poses,
+                std::vector<FrameMotion> chain, const ReaderOptions& options,
+                RecordingParts& parts) {
+  const std::string& body = poses.frames.child;
+  const bool differ = !camera.empty() && !body.empty() && body != camera;
+  FrameTree::Way way;
+  if (differ && options.has_hand_eye) {
+    try {
+      way = tree.way(body, camera);
+    } catch (const std::runtime_error&) {  // several ways: the hand-eye transform is the choice
+    }
+    if (!way.empty()) {
+      parts.notes.push_back(
+          {"pose-frame",
+           fmt::format("--hand-eye replaces the transform {}->{} of the bag", body, camera)});
+      way.clear();
+    }
+  } else if (differ && poses.is_transform && poses.frames.frame == camera) {
+    // The camera sees a body that rests: the inverse is the camera's pose.
+    for (StampedPose& pose : chain.front().moves) pose.T_world_rig = pose.T_world_rig.inverse();
+  } else if (differ) {
+    way = tree.way(body, camera);
+    if (way.empty()) {
+      parts.warnings.push_back(
+          {"pose-frame",
+           fmt::format(
+               "{}: the poses are those of the frame {}, the events are in the frame {}, and no "
+               "transform joins them: if the two differ, give --hand-eye FILE (T_body_rig, the "
+               "pose of {} in {}), or record /tf_static, too",
+               poses.name, body, camera, camera, body)});
+    }
+  }
+  for (FrameMotion& motion : tree.along(way)) chain.push_back(std::move(motion));
+  if (!way.empty() && parts.poses_damage.empty()) parts.poses_damage = tree.damage();
+  std::uint64_t left_out;
+  parts.poses = productOf(std::move(chain), left_out);
+  if (left_out > 0) {
+    parts.notes.push_back(
+        {"pose-frame", fmt::format("{}: {} poses are left out, as a transform begins later, ends "
+                                   "earlier or has a gap there",
+                                   poses.name, left_out)});
+  }
+}
+
+/// Reads the poses of "/tf:world->body". @param option value of `--topics`.
+void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const std::string& option,
+                      const ReaderOptions& options, RecordingParts& parts) {
+  try {
+    const FrameTree::Way way =
+        tree.wayThrough(option.substr(std::min(topicIn(option).size() + 1, option.size())));
+    if (way.front() == camera) {
+      throw std::runtime_error(fmt::format(
+          "poses of {} in the camera's frame: expected the camera's poses, --topics \"{}:{}\"",
+          way.back(), topicIn(option), fmt::join(way.rbegin(), way.rend(), "->")));
+    }
+    std::vector<FrameMotion> chain = tree.along(way);
+    parts.poses_damage = tree.damage();
+    if (std::all_of(chain.begin(), chain.end(),
+                    [](const FrameMotion& motion) { return motion.moves.empty(); })) {
+      throw std::runtime_error("constant: expected frames that move against each other");
+    }
+    const FramedPoses poses = {option, {}, {way.front(), way.back()}};
+    joinFrames(tree, camera, poses, std::move(chain), options, parts);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("--topics {}: {}", option, error.what()));
+  }
+}
+
 /// @param candidates topics with poses. @param cameras topics with events.
-void addPoses(const RosTopics& topics, const RosTopics& candidates, const RosTopics& cameras,
-              const ReaderOptions& options, RecordingParts& parts) {
-  constexpr std::int64_t kFirst = 1000;  // messages that name the frames
-  std::string transforms;                // the name of a topic
+void addPoses(const RosTopics& topics, RosTopics candidates, const RosTopics& cameras,
+              const FrameTree& tree, const ReaderOptions& options, RecordingParts& parts) {
+  const std::string camera =
+      parts.camera_frames.empty() ? options.camera_frame : parts.camera_frames.front().name;
+  std::string transforms;  // the name of a topic
   for (const RosTopic& topic : topics) {
     if (topic.type != RosType::kTransforms) continue;
-    if (transforms.empty()) transforms = topic.name;
-    for (const std::string& name : options.topics) {
-      if (topicIn(name) != topic.name) continue;
-      const std::string frames = name.substr(std::min(topic.name.size() + 1, name.size()));
-      try {
-        parts.poses = readFrames(topics, kEndOfTimeNs, parts.poses_damage).posesOf(frames);
-      } catch (const std::runtime_error& error) {
-        throw std::runtime_error(fmt::format("--topics {}: {}", name, error.what()));
+    if (transforms.empty() || topic.name == "/tf") transforms = topic.name;
+    for (const std::string& option : options.topics) {
+      if (topicIn(option) == topic.name) {
+        return addPosesOfFrames(tree, camera, option, options, parts);
       }
-      return;
     }
   }
   parts.expected_poses = "messages with poses";
+  std::string plans;
+  for (std::size_t i = candidates.size(); i-- > 0;) {
+    if (const auto why = whyNoTrajectory(candidates[i])) {
+      plans += fmt::format("; {} is no trajectory: {}", candidates[i].name, *why);
+      candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+  parts.expected_poses += plans;
   if (candidates.empty()) {
-    if (transforms.empty()) return;
-    std::string ignored;
-    parts.expected_poses +=
-        fmt::format("; or those of a frame, --topics \"{}:PARENT->CHILD\", of {}", transforms,
-                    readFrames(topics, kFirst, ignored).names());
+    for (const std::string& choice : tree.choices(camera)) {
+      parts.expected_poses += fmt::format(
+          "{} --topics \"{}:{}\"",
+          parts.expected_poses.back() == '"' ? "," : "; or those of a frame,", transforms, choice);
+    }
+    if (transforms.empty() && plans.empty()) return;
     parts.warnings.push_back({"pose-topic", "no poses: expected " + parts.expected_poses});
     return;
   }
   const RosTopic* topic = &candidates.front();
-  if (candidates.size() > 1) {
-    topic = densest(candidates, cameras);
-    const std::string all = namesOf(candidates);
+  if (candidates.size() > 1) topic = densest(candidates, cameras);
+  if (candidates.size() > 1 || !plans.empty()) {
+    const std::string all = namesOf(candidates) + plans;
     if (topic == nullptr) parts.expected_poses = "the choice of one by --topics, of " + all;
     parts.warnings.push_back(
         {"pose-topic",
@@ -352,12 +528,44 @@ void addPoses(const RosTopics& topics, const RosTopics& candidates, const RosTop
                            topic->name, all)});
     if (topic == nullptr) return;
   }
-  parts.poses_damage = forMessages(*topic, [&](const BagMessage& message) {
-    if (topic->type == RosType::kPath) parts.poses.clear();  // each path has all poses so far
-    for (const StampedPose& pose : decodePoses(message, topic->type)) parts.poses.push_back(pose);
-    return true;
-  });
-  if (!parts.poses_damage.empty()) parts.expected_poses += beforeThe(parts.poses_damage);
+  FramedPoses poses;
+  const std::string damage = readPoses(*topic, poses);
+  parts.poses_damage = damage;
+  std::vector<FrameMotion> chain = {std::move(poses.T_world_body)};
+  if (!chain.front().moves.empty()) {
+    try {
+      joinFrames(tree, camera, poses, std::move(chain), options, parts);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(
+          fmt::format("{}: from the poses' frame to the camera's: {} (or "
+                      "--hand-eye FILE)",
+                      topic->name, error.what()));
+    }
+  }
+  if (!damage.empty()) parts.expected_poses += beforeThe(damage);
+}
+
+/// Takes the frames of the cameras' events, and the cameras' poses by the transforms.
+void addCameraFrames(const RosTopics& cameras, const FrameTree& tree, RecordingParts& parts) {
+  for (const RosTopic& camera : cameras) {
+    auto& frame = parts.camera_frames.emplace_back();
+    frame.name = frameOf(camera);
+    const std::string& first = parts.camera_frames.front().name;
+    if (frame.name.empty() || frame.name == first) continue;
+    try {
+      const FrameTree::Way way = tree.way(first, frame.name);
+      std::vector<FrameMotion> chain = tree.along(way);
+      Rigid3 T_cam0_cam;
+      bool constant = !chain.empty();
+      for (const FrameMotion& motion : chain) {
+        constant = constant && motion.moves.empty();
+        T_cam0_cam = T_cam0_cam * motion.T_a_b;
+      }
+      if (constant) frame.T_cam0_cam = T_cam0_cam;
+    } catch (const std::runtime_error& error) {
+      parts.warnings.push_back({"camera-frame", fmt::format("{}: {}", frame.name, error.what())});
+    }
+  }
 }
 
 std::string_view namespaceOf(std::string_view topic) { return topic.substr(0, topic.rfind('/')); }
@@ -426,10 +634,17 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
   for (const auto& bag : bags) {
     if (options.lists_topics || with_poses.size() > 1) bag->countMessages();
   }
+  RosTopics with_frames = topics;
+  for (const std::filesystem::path& file : options.events_files) {
+    for (RosTopic& topic : topicsOf(openBagFiles(file))) with_frames.push_back(std::move(topic));
+  }
+  const FrameTree tree = treeOf(with_frames);
+  addCameraFrames(cameras, tree, parts);
   if (options.lists_topics) {
     std::transform(topics.begin(), topics.end(), std::back_inserter(parts.topics), recorded);
+    parts.transforms = tree.transforms();
   }
-  if (!options.leaves_out_poses) addPoses(topics, with_poses, cameras, options, parts);
+  if (!options.leaves_out_poses) addPoses(topics, with_poses, cameras, tree, options, parts);
   addCalibration(topics, cameras, parts);
   return parts;
 }

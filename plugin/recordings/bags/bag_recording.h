@@ -20,8 +20,11 @@ namespace efm {
 /// pose topic gives the poses. If it has no topic of a kind, topics of this kind are found by type.
 ///
 /// "/tf:world->body" in ReaderOptions::topics gives the poses of a frame from messages of
-/// tf2_msgs/TFMessage: one moving transform on the way from `world` to `body`, and constant ones
-/// (/tf_static) before and after it.
+/// tf2_msgs/TFMessage: a chain of moving and constant transforms (`FrameTree`).
+///
+/// The poses are final poses T_world_rig if transforms join their frame to the frame of camera 0's
+/// events, and the user gives no hand-eye transform. If nothing joins the two, the warning
+/// `pose-frame` names them.
 ///
 /// A camera's calibration is sensor_msgs/CameraInfo in the namespace of its events
 /// (/davis/left/camera_info for /davis/left/events). It has no extrinsics, so it is used only if

@@ -155,6 +155,10 @@ PoseNumbers takePose(MessageFields& fields) {
   return numbers;
 }
 
+std::string frameName(std::string_view frame) {
+  return std::string(frame.substr(frame.substr(0, 1) == "/" ? 1 : 0));
+}
+
 }  // namespace
 
 RosType rosTypeOf(std::string_view type) {
@@ -310,31 +314,49 @@ Rigid3 rigidOf(const PoseNumbers& numbers) {
                   quaternion.coeffs().stableNorm()));
 }
 
-std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type) {
+MessageFrames framesOf(const BagMessage& message, RosType type) {
   MessageFields fields(message);
-  std::vector<StampedPose> poses;
-  const std::int64_t t_ns = fields.header();
+  MessageFrames frames;
+  frames.frame = frameName(fields.headerAndFrame().second);
+  if (type == RosType::kTransform || type == RosType::kOdometry) {
+    frames.child = frameName(fields.text());
+  }
+  return frames;
+}
+
+std::vector<PathPose> decodePath(const BagMessage& message, std::int64_t& stamp_ns) {
+  MessageFields fields(message);
+  stamp_ns = fields.header();
+  std::vector<PathPose> poses;
+  for (auto count = fields.number<std::uint32_t>(); count > 0; --count) {
+    const std::int64_t t_ns = fields.header();
+    poses.push_back({t_ns, takePose(fields)});
+  }
+  return poses;
+}
+
+std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type) {
   if (type == RosType::kPath) {
-    for (auto count = fields.number<std::uint32_t>(); count > 0; --count) {
-      const std::int64_t stamp_ns = fields.header();
-      poses.push_back({stamp_ns, rigidOf(takePose(fields))});
+    std::int64_t stamp_ns;
+    std::vector<StampedPose> poses;
+    for (const PathPose& pose : decodePath(message, stamp_ns)) {
+      poses.push_back({pose.t_ns, rigidOf(pose.numbers)});
     }
     return poses;
   }
+  MessageFields fields(message);
+  const std::int64_t t_ns = fields.header();
   if (type == RosType::kTransform || type == RosType::kOdometry) fields.text();  // child_frame_id
   return {{t_ns, rigidOf(takePose(fields))}};
 }
 
 std::vector<FrameTransform> decodeTransforms(const BagMessage& message) {
-  const auto nameOf = [](std::string_view frame) {
-    return std::string(frame.substr(frame.substr(0, 1) == "/" ? 1 : 0));
-  };
   MessageFields fields(message);
   std::vector<FrameTransform> transforms;
   for (auto count = fields.number<std::uint32_t>(); count > 0; --count) {
     const auto [t_ns, parent] = fields.headerAndFrame();
     const std::string_view child = fields.text();
-    transforms.push_back({nameOf(parent), nameOf(child), t_ns, takePose(fields)});
+    transforms.push_back({frameName(parent), frameName(child), t_ns, takePose(fields)});
   }
   return transforms;
 }

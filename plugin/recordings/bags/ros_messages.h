@@ -75,6 +75,18 @@ void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& e
 /// column; the next vector begins after it. All values are 0 at the beginning of a packet.
 void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events);
 
+/// The frames that a message names, without a slash at their beginning; empty: none.
+struct MessageFrames {
+  std::string frame;  ///< Frame of the header.
+  std::string child;  ///< Frame whose pose a transform or odometry gives.
+
+  bool operator!=(const MessageFrames& other) const {
+    return frame != other.frame || child != other.child;
+  }
+};
+/// @param type any type whose messages begin with a header.
+MessageFrames framesOf(const BagMessage& message, RosType type);
+
 /// Decodes T_world_body from any type that `hasPoses`: the pose itself, the child frame's pose, or
 /// all poses of a path.
 /// @throws std::runtime_error also for values that are not finite and for a quaternion that is not
@@ -85,6 +97,13 @@ std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type);
 using PoseNumbers = std::array<double, 7>;
 /// @throws std::runtime_error as `decodePoses`.
 Rigid3 rigidOf(const PoseNumbers& numbers);
+
+struct PathPose {
+  std::int64_t t_ns;
+  PoseNumbers numbers;  ///< May be wrong.
+};
+/// Decodes the poses of a nav_msgs/Path. @param stamp_ns receives the time of its header.
+std::vector<PathPose> decodePath(const BagMessage& message, std::int64_t& stamp_ns);
 
 /// A transform T_parent_child between two frames, whose names have no slash at their beginning. Its
 /// numbers may be wrong.

@@ -113,6 +113,27 @@ std::size_t indexOf(const std::string& name, const std::vector<std::string>& all
       file.string(), all.empty() ? "no arrays" : all, given));
 }
 
+/// Rejects events of several cameras: a field or array with the camera has several values.
+/// @param column function that returns the column of a name.
+template <typename ColumnNamed>
+void requireOneCamera(const fs::path& file, const std::vector<std::string>& all,
+                      const ColumnNamed& column) {
+  for (const std::string& name : all) {
+    if (eventColumnOf(headerWord(name)) != 'c') continue;
+    const RowColumn cameras = column(name);
+    const std::uint64_t count = cameras.rows->size();
+    const double first = count > 0 ? cameras.number(0) : 0;
+    for (std::uint64_t row = 1; row < count; ++row) {
+      const double other = cameras.number(row);
+      if (other == first) continue;
+      throw std::runtime_error(
+          fmt::format("{}: {} = {} and {}: expected the events of one camera in a file: those with "
+                      "{} == {} (NumPy: e[e[\"{}\"] == {}])",
+                      file.string(), name, first, other, name, first, name, first));
+    }
+  }
+}
+
 /// Returns whether the fields are those of Metavision, whose times are in microseconds.
 bool isMetavision(const std::vector<NpyField>& fields) {
   constexpr struct {
@@ -146,6 +167,10 @@ EventTable fieldsOf(const fs::path& file, const FoundArray& found, const ReaderO
   const std::optional<EventNames> names = namesOf(all, options);
   if (!names) reject(file, {found}, options);
   const auto array = std::make_shared<NpyArray>(file, found.member, NpyPart{true, {}, false});
+  requireOneCamera(file, all, [&](const std::string& name) {
+    const auto own = std::make_shared<NpyArray>(file, found.member, NpyPart{true, {}, false});
+    return NpyArray::columnOf(own, indexOf(name, all));
+  });
   EventTable table = tableOf(*names, [&](const std::string& name) {
     return NpyArray::columnOf(array, indexOf(name, all));
   });
@@ -192,10 +217,12 @@ std::optional<EventTable> separateColumnsOf(const fs::path& file,
   }
   const std::optional<EventNames> names = namesOf(names_of_lists, options);
   if (!names) return std::nullopt;
-  return tableOf(*names, [&](const std::string& name) {
+  const auto column = [&](const std::string& name) {
     return NpyArray::columnOf(
         std::make_shared<NpyArray>(file, members[indexOf(name, names_of_lists)]), 0);
-  });
+  };
+  requireOneCamera(file, names_of_lists, column);
+  return tableOf(*names, column);
 }
 
 EventTable eventColumnsOf(const fs::path& file, const ReaderOptions& options) {

@@ -93,7 +93,9 @@ class JoinedRecording : public Recording {
   RecordingCounts counts() const override {
     RecordingCounts counts;
     counts.warnings = parts_.warnings;
+    counts.notes = parts_.notes;
     counts.topics = parts_.topics;
+    counts.transforms = parts_.transforms;
     counts.skipped_events = bad_->count();
     counts.first_skipped = bad_->first();
     for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {

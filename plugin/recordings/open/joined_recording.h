@@ -27,7 +27,9 @@ struct JoinedParts {
   /// error.
   std::uint64_t skip_bad_events = 0;
   std::vector<Warning> warnings;  ///< Warnings that come first in `RecordingCounts`.
+  std::vector<Warning> notes;     ///< The others go to `RecordingCounts` as they are.
   std::vector<RecordedTopic> topics;
+  std::vector<RecordedTransform> transforms;
 };
 
 /// Puts the parts in the order of time. For limits [t0, t1) on the clock of the poses, it keeps the

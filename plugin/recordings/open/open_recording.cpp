@@ -15,6 +15,7 @@
 #include "plugin/recordings/open/joined_recording.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/recording_formats.h"
+#include "plugin/recordings/streams/pose_conflict.h"
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
@@ -54,6 +55,10 @@ const RecordingFormat& rawlogFormat() {
   return format;
 }
 
+bool isBag(const RecordingFormat* format) {
+  return format != nullptr && format->name.rfind("rosbag", 0) == 0;
+}
+
 /// Returns the format of a source; null for a file of no format.
 const RecordingFormat* formatOf(const Path& path, const RecordingSource& source) {
   const std::string& name = source.format;
@@ -90,9 +95,15 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
   std::move(parts.warnings.begin(), parts.warnings.end(), std::back_inserter(all.warnings));
+  std::move(parts.notes.begin(), parts.notes.end(), std::back_inserter(all.notes));
   std::move(parts.topics.begin(), parts.topics.end(), std::back_inserter(all.topics));
+  std::move(parts.transforms.begin(), parts.transforms.end(), std::back_inserter(all.transforms));
+  all.camera_frames.resize(all.cameras.size() - parts.cameras.size());
+  std::move(parts.camera_frames.begin(), parts.camera_frames.end(),
+            std::back_inserter(all.camera_frames));
   if (all.poses_damage.empty()) all.poses_damage = std::move(parts.poses_damage);
   if (!all.default_size) all.default_size = parts.default_size;
+  if (all.one_camera.empty()) all.one_camera = std::move(parts.one_camera);
 }
 
 template <typename Read>
@@ -188,13 +199,12 @@ void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
 }
 
 /// Opens the files. Successive files of the same format are opened together.
-RecordingParts openParts(const RecordingSource& source) {
+RecordingParts openParts(const RecordingSource& source, bool has_hand_eye) {
   RecordingParts all;
   ReaderOptions options = source.reader;
+  options.has_hand_eye = has_hand_eye;
   options.leaves_out_poses = !source.poses.empty();
-  const RecordingFormat* const of_poses =
-      source.poses.empty() ? nullptr : detectFormat(source.poses);
-  options.topics_of_other_files = of_poses != nullptr && of_poses->name.rfind("rosbag", 0) == 0;
+  options.topics_of_other_files = !source.poses.empty() && isBag(detectFormat(source.poses));
   for (std::size_t i = 0; i < source.files.size();) {
     const RecordingFormat* const format = formatOf(source.files[i], source);
     if (format == nullptr) reject(source.files[i]);
@@ -215,6 +225,57 @@ RecordingParts openParts(const RecordingSource& source) {
     }
   }
   return all;
+}
+
+/// Adds the poses of the given file.
+void addGivenPoses(const RecordingSource& source, bool has_hand_eye, RecordingParts& parts) {
+  ReaderOptions options = source.reader;
+  options.has_hand_eye = has_hand_eye;
+  if (!parts.camera_frames.empty()) {
+    options.camera_frame = parts.camera_frames.front().name;
+    for (const Path& file : source.files) {
+      const RecordingFormat* const format = formatOf(file, source);
+      if (isBag(format) && file != source.poses) options.events_files.push_back(file);
+    }
+  }
+  RecordingParts given = readPoseParts(source.poses, options);
+  parts.poses = std::move(given.poses);
+  parts.pose_samples.clear();
+  parts.poses_damage.clear();
+  std::move(given.warnings.begin(), given.warnings.end(), std::back_inserter(parts.warnings));
+  std::move(given.notes.begin(), given.notes.end(), std::back_inserter(parts.notes));
+}
+
+/// @throws std::runtime_error for poses of a source that are not one trajectory.
+void requireOneTrajectoryEach(const RecordingParts& parts, const RecordingSource& source) {
+  const std::string name = sourceNames(source.files);
+  requireOneTrajectory(parts.poses, name);
+  std::map<PoseSourceId, std::vector<StampedPose>> by_source;
+  for (const PoseSample& pose : parts.pose_samples) {
+    by_source[pose.source].push_back({pose.t_ns, rigPose(pose, std::nullopt)});
+  }
+  for (const auto& [id, poses] : by_source) requireOneTrajectory(poses, name + ": " + asText(id));
+}
+
+/// Compares the cameras' poses on the rig with the transforms of a bag.
+void compareFrames(const std::vector<RecordingParts::CameraFrame>& frames, const Rig& rig,
+                   std::vector<Warning>& warnings) {
+  constexpr double kSameM = 0.01;
+  constexpr double kSameRad = kRadiansPerDegree;
+  for (std::size_t c = 1; c < std::min(frames.size(), rig.cameras.size()); ++c) {
+    if (!frames[c].T_cam0_cam || rig.cameras[c].model.fx == 0) continue;
+    const Rigid3 T_cam0_cam = rig.cameras[0].T_rig_cam.inverse() * rig.cameras[c].T_rig_cam;
+    const Vector6d change = differenceOf(T_cam0_cam.inverse() * *frames[c].T_cam0_cam);
+    const double apart_m = change.head<3>().norm();
+    const double apart_rad = change.tail<3>().norm();
+    if (apart_m <= kSameM && apart_rad <= kSameRad) continue;
+    warnings.push_back(
+        {"camera-frame",
+         fmt::format("camera {} is {:.3g} m and {:.3g} degrees away from the transform {}->{} of "
+                     "the bag: the calibration is of another rig, its cameras are in another "
+                     "order, or the transform is wrong (--calibration, --topics)",
+                     c, apart_m, apart_rad / kRadiansPerDegree, frames[0].name, frames[c].name)});
+  }
 }
 
 /// Returns a sensor's size: from the stream, the recording's own or the given calibration.
@@ -339,20 +400,16 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
   return all;
 }
 
-/// Returns the poses of the given file, else the recording's own poses, with the faults.
-std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<StampedPose>& given,
-                                const RecordingSource& source, const RigSetup& setup,
-                                const Rig& rig) {
-  const bool replaced = !source.poses.empty();
-  if (!replaced && parts.poses.empty() && parts.pose_samples.empty() && source.complete) {
+/// Returns the poses with the faults.
+std::vector<PoseSample> posesOf(RecordingParts& parts, const RecordingSource& source,
+                                const RigSetup& setup, const Rig& rig) {
+  if (parts.poses.empty() && parts.pose_samples.empty() && source.complete) {
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
   }
   const bool moved = source.faults.move();
   std::vector<PoseSample> samples = std::move(parts.pose_samples);
-  if (replaced || samples.empty()) {
-    samples = samplesOf(replaced ? given : parts.poses, source.rounded || moved);
-  }
+  if (samples.empty()) samples = samplesOf(parts.poses, source.rounded || moved);
   if (source.faults.any()) {
     samples = withFaults(std::move(samples), source.faults, source.rounded, setup.T_body_rig, rig);
   }
@@ -364,6 +421,15 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<Stamped
     }
   }
   return samples;
+}
+
+/// @throws std::runtime_error if a file of several cameras does not fit the calibration.
+void requireCameras(const Calibration& given, const RecordingParts& parts) {
+  try {
+    given.requireCameras(parts.cameras.size());
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{} ({})", error.what(), parts.one_camera));
+  }
 }
 
 /// @param given words for how the file was given; empty: as the value of `option`.
@@ -395,11 +461,15 @@ RigSetup readRigSetup(const RecordingSource& source) {
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   requireGivenFile(source.poses, "--poses", {});
   RigSetup setup = readRigSetup(source);
-  std::vector<StampedPose> poses;
-  if (!source.poses.empty()) poses = readPoses(source.poses, source.reader);
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
-  RecordingParts parts = openParts(source);
+  const bool has_hand_eye = setup.T_body_rig.has_value();
+  RecordingParts parts = openParts(source, has_hand_eye);
   takeFilesOfFolder(source, parts);
+  if (source.poses.empty()) {
+    requireOneTrajectoryEach(parts, source);
+  } else {
+    addGivenPoses(source, has_hand_eye, parts);
+  }
   if (parts.cameras.empty() && source.complete) {
     throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
   }
@@ -408,6 +478,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     setup.calibration = setup.calibration->of(parts.cameras.size(), source.cameras);
   }
   const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
+  if (given != nullptr && !parts.one_camera.empty()) requireCameras(*given, parts);
   if (given != nullptr && parts.calibration &&
       parts.calibration->rig.cameras.size() != parts.cameras.size()) {
     parts.calibration.reset();
@@ -420,14 +491,17 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
                                 source.packet_ns);
   }
-  joined.poses = posesOf(parts, poses, source, setup, joined.rig);
-  if (source.poses.empty()) joined.poses_damage = std::move(parts.poses_damage);
+  compareFrames(parts.camera_frames, given != nullptr ? given->rig : joined.rig, parts.warnings);
+  joined.poses = posesOf(parts, source, setup, joined.rig);
+  joined.poses_damage = std::move(parts.poses_damage);
   if (!source.complete) joined.others = std::move(parts.others);
   joined.all_poses = source.complete;
   joined.latency_ns = source.faults.latency_ns;
   joined.skip_bad_events = source.skip_bad_events;
   joined.warnings = std::move(parts.warnings);
+  joined.notes = std::move(parts.notes);
   joined.topics = std::move(parts.topics);
+  joined.transforms = std::move(parts.transforms);
   return join(std::move(joined), source.limits);
 }
 

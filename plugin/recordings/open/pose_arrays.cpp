@@ -142,6 +142,7 @@ int timeExponentOf(const RowColumn& times, const std::string& name, const Reader
     const double t = times.number(row);
     sample.add(t, !isReal(times.type) || std::floor(t) == t);
   }
+  if (options.pose_time_unit.empty()) requireTimesOfPoses(sample, name);
   return sample.whole ? poseTimeExponent(options, sample, name) : 0;
 }
 

@@ -17,6 +17,7 @@
 #include "plugin/recordings/sensors/aedat4.h"
 #include "plugin/recordings/sensors/prophesee_raw.h"
 #include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/streams/pose_conflict.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
@@ -226,7 +227,7 @@ void rejectUnread(const fs::path& file) {
   }
 }
 
-std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions options) {
+RecordingParts posesOfRecording(const fs::path& file, ReaderOptions options) {
   const RecordingFormat* const format = detectFormat(file);
   if (format == nullptr) {
     rejectUnread(file);
@@ -237,21 +238,26 @@ std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions op
   options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
   if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
-  if (!parts.poses.empty()) return std::move(parts.poses);
+  if (!parts.poses.empty()) return parts;
   throw std::runtime_error(
       fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));
 }
 
-std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions& options) {
+RecordingParts readAnyPoses(const fs::path& file, const ReaderOptions& options) {
   std::error_code ignored;
+  RecordingParts parts;
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
-  if (looksLikeNumpy(file)) return readPoseArrays(file, options);
+  if (looksLikeNumpy(file)) {
+    parts.poses = readPoseArrays(file, options);
+    return parts;
+  }
   const std::string start = firstContentOf(file, 4096);
   requireTextLines(start, file.string());
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
   rejectUnread(file);
-  return readPoseText(file, options);
+  parts.poses = readPoseText(file, options);
+  return parts;
 }
 
 }  // namespace
@@ -342,8 +348,15 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source) {
   return nullptr;
 }
 
+RecordingParts readPoseParts(const fs::path& file, const ReaderOptions& options) {
+  RecordingParts parts = readAnyPoses(file, options);
+  parts.poses = requirePoses(std::move(parts.poses), file);
+  requireOneTrajectory(parts.poses, file.string());
+  return parts;
+}
+
 std::vector<StampedPose> readPoses(const fs::path& file, const ReaderOptions& options) {
-  return requirePoses(readAnyPoses(file, options), file);
+  return readPoseParts(file, options).poses;
 }
 
 }  // namespace efm

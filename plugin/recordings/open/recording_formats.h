@@ -35,7 +35,10 @@ void requireRawlog(const std::filesystem::path& file);
 ///   text, also compressed   see `readPoseText` (text/)
 ///   NumPy arrays            see `readPoseArrays`
 ///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
-/// @return at least one pose, in the order of the file.
+/// @return at least one pose, in the order of the file; and the reader's warnings and notes.
+/// @throws std::runtime_error also for poses that are not one trajectory: see `PoseConflict`.
+RecordingParts readPoseParts(const std::filesystem::path& file, const ReaderOptions& options);
+/// Returns the poses of `readPoseParts`.
 std::vector<StampedPose> readPoses(const std::filesystem::path& file,
                                    const ReaderOptions& options = {});
 

@@ -138,7 +138,29 @@ std::string EventPackets::problemOf(std::size_t i) const {
       event.t_ns > newest_ns_
           ? "a time near those of the events beside it, of which the one before is at {}"
           : "events in time order, at most 10 ms before the newest ({})";
-  return problem("t", formatSeconds(event.t_ns), fmt::format(expected, formatSeconds(newest_ns_)));
+  return problem("t", formatSeconds(event.t_ns),
+                 fmt::format(expected, formatSeconds(newest_ns_)) +
+                     (event.t_ns > newest_ns_ ? "" : inOrder()));
+}
+
+/// Returns what sorts the events, for errors.
+std::string EventPackets::inOrder() const {
+  const std::string command = stream_->commandInOrder();
+  return command.empty() ? "; sort the events by time" : "; this sorts them: " + command;
+}
+
+/// Rejects events of which many are late: without them, the rest would be a wrong recording.
+void EventPackets::rejectDisorder() {
+  constexpr std::uint64_t kEnough = 1000;
+  constexpr std::uint64_t kFew = 10;
+  const bool many = read_events_ >= kEnough && 5 * late_events_ > read_events_;  // before the end
+  const bool some = ended_ && late_events_ >= kFew && 100 * late_events_ > read_events_;
+  if (!many && !some) return;
+  if (read_events_ <= block_.size()) events_.clear();  // none of them was used yet
+  throw std::runtime_error(fmt::format(
+      "{}: {} of {} events are over 10 ms late, first {}: expected events in time order{}; "
+      "--skip-bad-events is for at most 1 % of late events",
+      stream_->name(), late_events_, read_events_, first_late_, inOrder()));
 }
 
 void EventPackets::take(const Event& event) {
@@ -164,8 +186,12 @@ void EventPackets::takeBlock() {
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
     if (ahead_) settleAhead(event.t_ns);
-    if (ended_) return;  // errors after this time do not matter
+    if (ended_) return rejectDisorder();  // errors after this time do not matter
+    ++read_events_;
     if (!isGood(event)) {
+      if (event.t_ns < newest_ns_ - kMaxEventDelayNs && late_events_++ == 0) {
+        first_late_ = stream_->positionOf(i);
+      }
       reject(problemOf(i));
     } else if (event.t_ns - newest_ns_ <= kFarAheadNs || newest_ns_ == -kEndOfTimeNs) {
       take(event);
@@ -175,6 +201,7 @@ void EventPackets::takeBlock() {
     }
   }
   rejectEqualTimes();
+  rejectDisorder();
 }
 
 /// Counts in whole blocks, which costs nothing: too many events of one time fill several blocks.

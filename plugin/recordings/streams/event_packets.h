@@ -23,7 +23,9 @@ inline constexpr std::size_t kMaxPacketEvents = std::size_t{1} << 20;
 /// Checks the events of a camera, sorts events that are up to 10 ms late and divides the events
 /// into packets on a grid of time. It reads on demand: memory holds one block, one packet and the
 /// events of 10 ms. More than 4 events per pixel at one time are an error. An event is wrong if it
-/// is over 1 s ahead of both its neighbours, or over 10 s ahead at the end. A wrong event is a
+/// is over 1 s ahead of both its neighbours, or over 10 s ahead at the end. If more than 1 % of the
+/// events, at least ten, are over 10 ms late, they are not in order at all: an error, also if wrong events may be
+/// left out. A wrong event is a
 /// std::runtime_error that names the position, the value and the expected value. The error is
 /// thrown after the packets of the earlier events, and again by every further call.
 class EventPackets {
@@ -66,6 +68,8 @@ class EventPackets {
   void take(const Event& event);
   void settleAhead(std::int64_t next_ns);
   void rejectEqualTimes();
+  void rejectDisorder();
+  std::string inOrder() const;
   void reject(const std::string& problem);
   bool isGood(const Event& event) const;
   std::string problemOf(std::size_t i) const;
@@ -77,6 +81,9 @@ class EventPackets {
   std::int64_t start_ns_ = -kEndOfTimeNs;
   std::int64_t stop_ns_ = kEndOfTimeNs;
   std::optional<std::int64_t> before_ns_, after_ns_;
+  std::uint64_t read_events_ = 0;
+  std::uint64_t late_events_ = 0;  // over 10 ms
+  std::string first_late_;         // position of the first of them
   bool ended_ = false;
   std::exception_ptr error_;  // the error of the wrong event
 

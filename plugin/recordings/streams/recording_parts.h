@@ -86,6 +86,8 @@ class EventStream {
   /// The number of events without a known time or row, which are left out: events before the
   /// sensor's first time words and after a gap. Events before the time of `seek` do not count.
   virtual std::uint64_t undatedEvents() const { return 0; }
+  /// A command that sorts the file's events by time; empty: there is none.
+  virtual std::string commandInOrder() const { return {}; }
   /// Warnings about properties that the file does not state and that the reader concluded from the
   /// values: `time-unit`, `event-columns`.
   virtual std::vector<Warning> warnings() const { return {}; }
@@ -122,8 +124,19 @@ struct RecordingParts {
   std::string poses_damage;
 
   std::vector<Warning> warnings;  ///< Warnings about files and topics that were found and taken.
+  std::vector<Warning> notes;     ///< What the user's files replaced, and what was left out.
   std::vector<RecordedTopic> topics;  ///< All topics of a bag, see `ReaderOptions::lists_topics`.
+  std::vector<RecordedTransform> transforms;  ///< All transforms of a bag, as `topics`.
 
+  /// The frame of each camera's events and the camera's pose T_cam0_cam by the transforms of a bag.
+  struct CameraFrame {
+    std::string name;  ///< Empty: not known.
+    std::optional<Rigid3> T_cam0_cam;
+  };
+  std::vector<CameraFrame> camera_frames;
+
+  /// If a file has the events of several cameras: how to take one of them, for errors.
+  std::string one_camera;
   /// The format's names of its parts, for errors about missing parts: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";
   std::string expected_poses = "poses in the recording";
@@ -150,6 +163,13 @@ struct ReaderOptions {
   bool topics_of_other_files = false;
   bool lists_topics = false;      ///< True if `RecordingParts::topics` is needed.
   bool leaves_out_poses = false;  ///< True if another file gives the poses.
+  /// True if the user gives a hand-eye transform: a bag's transforms do not join its poses' frame
+  /// to that of camera 0.
+  bool has_hand_eye = false;
+  /// The recording of the events, if the poses come from another bag: the frame of camera 0's
+  /// events, and bags that may have transforms.
+  std::string camera_frame{};
+  std::vector<std::filesystem::path> events_files{};
 };
 
 /// A family of formats. A new format is a row of the table in recording_formats.cpp.

@@ -91,6 +91,9 @@ std::int64_t nanosecondsPer(int exponent) {
 void TimeSample::add(double t, bool is_whole) {
   earliest = count == 0 ? t : std::min(earliest, t);
   latest = count == 0 ? t : std::max(latest, t);
+  rising = rising && (count == 0 || t > last);
+  has_parts = has_parts || std::floor(t) != t;
+  last = t;
   ++count;
   whole = whole && is_whole;
   float32 = float32 && static_cast<double>(static_cast<float>(t)) == t;
@@ -151,6 +154,31 @@ void requireSecondsOfPoses(const TimeSample& sample, const std::string& where) {
   throw std::runtime_error(fmt::format("{}: {} poses take {:.3g} of a unit that is not seconds: {}",
                                        where, sample.count, sample.latest - sample.earliest,
                                        guessOf(sample, kUsualPoseRate)));
+}
+
+void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
+                         const std::string& renumber) {
+  constexpr int kEnough = 3;
+  constexpr double kMostFrames = 1e6;
+  if (sample.count < kEnough) return;
+  if (sample.earliest == sample.latest) {
+    throw std::runtime_error(
+        fmt::format("{}: the first {} poses have one time, {:.9g}: expected a time of its own for "
+                    "each pose (were they written with six digits? numpy.savetxt(FILE, poses, "
+                    "fmt='%.9f') writes all)",
+                    where, sample.count, sample.latest));
+  }
+  const bool consecutive = sample.latest - sample.earliest == sample.count - 1;
+  if (!sample.rising || sample.has_parts || sample.earliest < 0 || sample.latest >= kMostFrames ||
+      (sample.whole && !(consecutive && sample.earliest <= 1))) {
+    return;
+  }
+  throw std::runtime_error(fmt::format(
+      "{}: the times are whole numbers from {} on, {}: numbers of frames? Expected times{}; if "
+      "they "
+      "are times, --pose-time-unit s, ms, us or ns",
+      where, sample.earliest, consecutive ? "each one more than the last" : "at least 1 apart",
+      renumber.empty() ? "" : " (" + renumber + ")"));
 }
 
 int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,

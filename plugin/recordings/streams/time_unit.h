@@ -113,6 +113,9 @@ struct TimeSample {
   double max = 0;       ///< The largest absolute value.
   double earliest = 0;  ///< The smallest time.
   double latest = 0;
+  bool rising = true;      ///< True if each time is later than the one before it.
+  bool has_parts = false;  ///< True if a time is no whole number, however it is written.
+  double last = 0;
 
   void add(double t, bool is_whole);
   /// Adds a time as it was written. With an exponent, as NumPy writes it, the value tells whether
@@ -154,6 +157,12 @@ TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
 /// @throws std::runtime_error naming the likely unit if poses with decimals are too rare for
 /// seconds.
 void requireSecondsOfPoses(const TimeSample& sample, const std::string& where);
+
+/// Rejects times of poses that are no times, if no unit is given: one time for all poses, as six
+/// written digits of a date give, and the numbers of frames.
+/// @param renumber command that replaces numbers by times; empty: none.
+void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
+                         const std::string& renumber = {});
 
 /// Finds the exponent for times of poses. Their option is `pose_time_unit`; `time_unit` holds for
 /// whole numbers. A unit that only the values show is an error, too.

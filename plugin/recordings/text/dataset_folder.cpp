@@ -78,7 +78,13 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
                     parts.calibration->file.string(), count, with_events, with_events - 1));
   }
   for (std::size_t camera = 0; camera < count; ++camera) {
-    parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera), options));
+    auto streams = openEventText(eventsOf(folder, camera), options);
+    if (streams.size() > 1) {
+      throw std::runtime_error(fmt::format(
+          "{}: events of {} cameras: expected one in each folder camN, or give the file itself",
+          streams.front()->name(), streams.size()));
+    }
+    parts.cameras.push_back(std::move(streams.front()));
   }
   return parts;
 }
@@ -88,7 +94,8 @@ void addFolderFiles(const fs::path& folder, const ReaderOptions& options, Record
   if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
     std::error_code ignored;
-    if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
+    if (options.leaves_out_poses || !parts.poses.empty() || !fs::exists(folder / name, ignored))
+      continue;
     parts.poses = requirePoses(readPoseText(folder / name, options), folder / name);
   }
 }
@@ -119,14 +126,16 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
   parts.expected_calibration = "calib.txt or camchain.yaml";
   parts.expected_poses = "groundtruth.txt or poses.txt";
   parts.default_size = CameraSize{240, 180};  // the whole dataset was recorded with a DAVIS240C
-  auto events = std::make_unique<EventTextStream>(eventFileIn(folder), options);
-  if (const auto size = sizeOfImages(folder)) events->setSize(*size);
-  parts.cameras.push_back(std::move(events));
+  const auto size = sizeOfImages(folder);
+  for (auto& events : openEventText(eventFileIn(folder), options)) {
+    if (size) events->setSize(*size);
+    parts.cameras.push_back(std::move(events));
+  }
   std::error_code ignored;
   if (fs::exists(folder / "calib.txt", ignored)) {
     parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
-  if (fs::exists(folder / "groundtruth.txt", ignored)) {
+  if (!options.leaves_out_poses && fs::exists(folder / "groundtruth.txt", ignored)) {
     parts.poses =
         requirePoses(readPoseText(folder / "groundtruth.txt", options), folder / "groundtruth.txt");
   }

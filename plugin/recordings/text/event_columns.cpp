@@ -30,9 +30,10 @@ bool hasNumber(const std::vector<std::string_view>& fields) {
 }
 
 bool isComplete(const std::string& order) {
-  return std::all_of(kEventColumns.begin(), kEventColumns.end(), [&](char column) {
-    return std::count(order.begin(), order.end(), column) == 1;
-  });
+  return std::all_of(
+             kEventColumns.begin(), kEventColumns.end(),
+             [&](char column) { return std::count(order.begin(), order.end(), column) == 1; }) &&
+         std::count(order.begin(), order.end(), 'c') <= 1;
 }
 
 bool isComment(std::string_view line) {
@@ -67,10 +68,12 @@ bool takeNames(std::string_view line, EventColumns& columns) {
 std::string orderOfOption(const std::string& text) {
   std::string order;
   for (const std::string_view word : splitWords(text, " ,")) order += word;
-  if (isComplete(order) && order.find_first_not_of("txyp-") == std::string::npos) return order;
-  throw std::runtime_error(fmt::format(
-      "--event-columns {}: expected t, x, y and p, each once, and - for a column to ignore",
-      inQuotes(text)));
+  if (isComplete(order) && order.find_first_not_of("txypc-") == std::string::npos) return order;
+  throw std::runtime_error(
+      fmt::format("--event-columns {}: expected t, x, y and p, each once, c for a column with the "
+                  "camera, and - "
+                  "for a column to ignore",
+                  inQuotes(text)));
 }
 
 namespace {
@@ -232,7 +235,8 @@ bool looksLikeEventLines(std::string_view beginning, const std::string& option) 
   }
   if (count != order.size()) return false;
   for (std::size_t k = 0; k < count; ++k) {
-    if ((order[k] != '-' || option.empty()) && !numberOf(first->fields[k])) return false;
+    const bool any = order[k] == 'c' || (order[k] == '-' && !option.empty());
+    if (!any && !numberOf(first->fields[k])) return false;
   }
   return true;
 }
@@ -259,7 +263,7 @@ std::optional<std::string> whyNoEventLines(std::string_view beginning) {
   }
   for (std::size_t k = 0; k < count; ++k) {
     const std::string_view field = first->fields[k];
-    if (numberOf(field)) continue;
+    if (numberOf(field) || first->order[k] == 'c') continue;
     return why(fmt::format("{} = {}: expected {}", first->order[k], inQuotes(field),
                            first->order[k] == 'p' ? kExpectedPolarity : "a number"));
   }
@@ -290,6 +294,7 @@ char eventColumnOf(const HeaderWord& word) {
       {'y',
        " y ys v row y_pos pos_y ypos posy y_px px_y pixel_y y_pixel y_coord coord_y "
        "y_coordinate y_addr "},
+      {'c', " camera camera_id cam cam_id camid cameraid camera_index sensor sensor_id "},
       {'p', " p ps pol pols polarity polarities on on_off sign "}};
   if (word.isTime()) return 't';
   for (const auto& [column, names] : kNames) {

@@ -34,7 +34,8 @@ std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::strin
 
 /// The positions of an event's numbers in a line of text.
 struct EventColumns {
-  std::string order = "txyp";      ///< A letter per column; '-' for a column to ignore.
+  /// A letter per column; 'c' for the camera's name, '-' for a column to ignore.
+  std::string order = "txyp";
   char separator = ' ';            ///< ' ', ',' or ';'. Blanks always separate, too.
   int time_exponent = 0;           ///< The unit of times is 10^time_exponent s.
   std::uint64_t header_lines = 0;  ///< Number of lines to skip at the beginning.
@@ -71,7 +72,8 @@ std::optional<int> polarityOf(std::string_view text);
 inline constexpr const char* kExpectedPolarity =
     "polarity 0 or 1, or -1 or 1, or True or False, or ON or OFF";
 
-/// Returns the column that a name means: 't', 'x', 'y' or 'p', or '-' for an unknown name.
+/// Returns the column that a name means: 't', 'x', 'y' or 'p', 'c' for the camera of the event, or
+/// '-' for an unknown name.
 char eventColumnOf(const HeaderWord& word);
 
 /// Returns the order of columns without names, a letter each. It is the order of `--event-columns`
@@ -89,7 +91,8 @@ using EventNames = std::array<std::string, 4>;
 bool hasAll(const EventNames& names);
 
 /// Returns the letters in `--event-columns "t x y p"`.
-/// @throws std::runtime_error unless they are t, x, y and p, each once, and - for ignored columns.
+/// @throws std::runtime_error unless they are t, x, y and p, each once, c at most once, and - for
+/// ignored columns.
 std::string orderOfOption(const std::string& text);
 
 /// Returns the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`.

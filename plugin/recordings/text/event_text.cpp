@@ -8,6 +8,7 @@
 #include <cassert>
 #include <limits>
 #include <memory>
+#include <set>
 #include <stdexcept>
 
 #include "mapping/base/text.h"
@@ -115,10 +116,50 @@ std::string_view wholeLines(std::string_view text, bool ended) {
   return ended ? text : text.substr(0, text.rfind('\n') + 1);
 }
 
+/// Returns the different values of the camera's column, in natural order.
+std::vector<std::string> camerasIn(const std::filesystem::path& file, const EventColumns& columns) {
+  constexpr std::size_t kMost = 64;
+  const auto naturally = [](const std::string& a, const std::string& b) {
+    return std::make_pair(a.size(), a) < std::make_pair(b.size(), b);  // 2 before 10
+  };
+  std::set<std::string, decltype(naturally)> cameras(naturally);
+  const std::size_t column = columns.order.find('c');
+  FileContent content(file);
+  std::vector<char> block(kBlockBytes);
+  std::string_view last;
+  std::size_t carried = 0;
+  std::uint64_t line_number = 0;
+  for (bool ended = false; !ended && cameras.size() <= kMost;) {
+    const std::size_t wanted = block.size() - carried;
+    const std::size_t count = content.read(block.data() + carried, wanted);
+    ended = count < wanted;
+    const std::string_view text(block.data(), carried + count);
+    std::string_view lines = wholeLines(text, ended);
+    carried = text.size() - lines.size();
+    if (lines.empty()) break;  // the reader of events rejects so long a line
+    while (!lines.empty()) {
+      const std::string_view line = trimmed(takeLine(lines));
+      if (++line_number <= columns.header_lines) continue;
+      const auto fields = eventFields(line.substr(0, line.find('#')), columns.separator);
+      if (fields.size() != columns.order.size() || fields[column] == last) continue;
+      last = *cameras.emplace(fields[column]).first;
+    }
+    std::copy(text.end() - static_cast<std::ptrdiff_t>(carried), text.end(), block.begin());
+  }
+  if (cameras.size() > kMost) {
+    throw std::runtime_error(
+        fmt::format("{}: column {}: over {} cameras: expected a column with the event's camera "
+                    "(another column: --event-columns, - for one to ignore)",
+                    file.string(), column + 1, kMost));
+  }
+  return {cameras.begin(), cameras.end()};
+}
+
 }  // namespace
 
-EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions& options)
-    : content_(std::move(file)), block_(kFirstBytes) {
+EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions& options,
+                                 std::string camera)
+    : content_(std::move(file)), camera_(std::move(camera)), block_(kFirstBytes) {
   carried_ = content_.read(block_.data(), kFirstBytes);
   ended_ = carried_ < kFirstBytes;
   const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
@@ -162,10 +203,12 @@ void EventTextStream::takeLines(const char* begin, const char* end, std::vector<
   assert(begin == end || end[-1] == '\n');
   lines_.emplace_back(events.size(), line_ + 1);
   Event event;
+  bool of_camera = true;
   while (begin != end) {
     ++line_;
-    if (const char* const next = parsePlainLine(begin, event)) {
-      events.push_back(event);
+    if (const char* const next = parsePlainLine(begin, event, of_camera)) {
+      if (of_camera) events.push_back(event);
+      if (!of_camera) lines_.emplace_back(events.size(), line_ + 1);
       begin = next;
     } else {
       const char* const newline = std::find(begin, end, '\n');
@@ -192,7 +235,7 @@ void EventTextStream::takeLine(std::string_view line, bool unterminated,
 
 /// Parses a plain line fast. Each step stops at the newline at the latest.
 /// @return the next line; null if `parseLine` must parse this line.
-const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
+const char* EventTextStream::parsePlainLine(const char* text, Event& event, bool& of_camera) const {
   if (usual_) {
     if (!takeTime(text, 9, event) || !takeBlanks(text) || !takePixel(text, event.x) ||
         !takeBlanks(text) || !takePixel(text, event.y) || !takeBlanks(text) ||
@@ -204,12 +247,15 @@ const char* EventTextStream::parsePlainLine(const char* text, Event& event) cons
     for (std::size_t k = 0; k < columns_.order.size(); ++k) {
       if (k > 0 && !takeSeparator(text, columns_.separator)) return nullptr;
       const char column = columns_.order[k];
+      const char* const begin = text;
       const bool taken = column == 't'   ? takeTime(text, decimals_of_ns, event)
                          : column == 'x' ? takePixel(text, event.x)
                          : column == 'y' ? takePixel(text, event.y)
                          : column == 'p' ? takePolarity(text, event.polarity)
                                          : takeIgnored(text, columns_.separator);
       if (!taken) return nullptr;
+      if (column != 'c') continue;
+      of_camera = isOfCamera({begin, static_cast<std::size_t>(text - begin)});
     }
   }
   if (*text == '\r') ++text;
@@ -220,8 +266,11 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   const std::string_view content = line.substr(0, line.find('#'));
   const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
   if (fields.empty()) return std::nullopt;
+  const std::size_t camera = columns_.order.find('c');
+  if (camera < fields.size() && !isOfCamera(fields[camera])) return std::nullopt;
   const auto names = [&] { return fmt::join(columns_.order, " "); };
   const std::size_t count = columns_.order.size();
+  if (fields.size() != count && ignores_bad_lines_) return std::nullopt;
   if (fields.size() < count && unterminated) {
     throw std::runtime_error(fmt::format("{}: {}: expected {}, but the file ends within the line",
                                          place(line_), inQuotes(content), names()));
@@ -277,8 +326,11 @@ std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEven
     const std::size_t newline = text.find('\n', begin);
     if (newline == std::string_view::npos) break;
     Event event;
-    if (parsePlainLine(text.data() + begin, event) != nullptr) {
-      return std::pair(byte + begin, event.t_ns);
+    bool of_camera = true;
+    if (parsePlainLine(text.data() + begin, event, of_camera) != nullptr) {
+      if (of_camera) return std::pair(byte + begin, event.t_ns);
+      begin = newline;
+      continue;
     }
     try {
       const auto parsed = parseLine(text.substr(begin, newline - begin), false);
@@ -322,6 +374,30 @@ std::string EventTextStream::positionOf(std::size_t index) const {
   return place(line + (index - first));
 }
 
+std::string EventTextStream::commandInOrder() const {
+  const std::size_t column = columns_.order.find('t') + 1;
+  const bool plain = content_.seekableBytes() > 0;
+  const std::string separator =
+      columns_.separator == ' ' ? "" : fmt::format(" -t'{}'", columns_.separator);
+  const std::string sort = fmt::format("sort{} -g -k{},{} -s", separator, column, column);
+  if (columns_.header_lines == 0) {
+    return plain ? sort + " FILE >NEW" : "zcat FILE | " + sort + " >NEW";
+  }
+  return fmt::format("({} FILE | head -n {}; {} FILE | tail -n +{} | {}) >NEW",
+                     plain ? "cat" : "zcat", columns_.header_lines, plain ? "cat" : "zcat",
+                     columns_.header_lines + 1, sort);
+}
+
+std::string EventTextStream::commandOfCamera() const {
+  const std::size_t column = columns_.order.find('c') + 1;
+  return fmt::format(
+      "{} has the events of several cameras in column {}; one alone: {}awk{} 'NR <= {} || ${} == "
+      "\"{}\"'{} >NEW",
+      name(), column, content_.seekableBytes() > 0 ? "" : "zcat FILE | ",
+      columns_.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.separator),
+      columns_.header_lines, column, camera_, content_.seekableBytes() > 0 ? " FILE" : "");
+}
+
 std::string EventTextStream::place(std::uint64_t line) const {
   if (first_byte_ == 0) return fmt::format("{}:{}", name(), line);
   return fmt::format("{}: line {} after byte {}", name(), line, first_byte_);
@@ -343,11 +419,28 @@ bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& 
   }
 }
 
+std::vector<std::unique_ptr<EventTextStream>> openEventText(const std::filesystem::path& file,
+                                                            const ReaderOptions& options) {
+  std::vector<std::unique_ptr<EventTextStream>> streams;
+  streams.push_back(std::make_unique<EventTextStream>(file, options));
+  const EventColumns& columns = streams.front()->columns();
+  if (columns.order.find('c') == std::string::npos) return streams;
+  const std::vector<std::string> cameras = camerasIn(file, columns);
+  if (cameras.size() > 1) streams.clear();
+  for (std::size_t i = 0; streams.size() < cameras.size(); ++i) {
+    streams.push_back(std::make_unique<EventTextStream>(file, options, cameras[i]));
+    if (i > 0) streams.back()->ignoreBadLines();
+  }
+  return streams;
+}
+
 RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
                              const ReaderOptions& options) {
   RecordingParts parts;
   for (const std::filesystem::path& file : files) {
-    parts.cameras.push_back(std::make_unique<EventTextStream>(file, options));
+    auto streams = openEventText(file, options);
+    if (streams.size() > 1) parts.one_camera = streams.front()->commandOfCamera();
+    for (auto& stream : streams) parts.cameras.push_back(std::move(stream));
   }
   return parts;
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,7 +23,9 @@ namespace efm {
 /// are ignored.
 class EventTextStream : public EventStream {
  public:
-  explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {});
+  /// @param camera takes only the lines with this text in the camera's column; empty: all lines.
+  explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {},
+                           std::string camera = {});
 
   bool read(std::vector<Event>& events) override;
   void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
@@ -35,16 +38,27 @@ class EventTextStream : public EventStream {
   std::optional<CameraSize> size() const override { return columns_.size; }
   std::vector<Warning> warnings() const override { return columns_.warnings; }
   void setSize(const CameraSize& size) { columns_.size = size; }
+  std::string label() const override { return camera_.empty() ? camera_ : "camera " + camera_; }
+  std::string commandInOrder() const override;
+  /// A command that takes the events of this stream's camera out of the file, for errors.
+  std::string commandOfCamera() const;
+  const EventColumns& columns() const { return columns_; }
+  /// Leaves lines with a wrong number of fields to the stream of another camera.
+  void ignoreBadLines() { ignores_bad_lines_ = true; }
 
  private:
   void takeLines(const char* begin, const char* end, std::vector<Event>& events);
   void takeLine(std::string_view line, bool unterminated, std::vector<Event>& events);
-  const char* parsePlainLine(const char* text, Event& event) const;
+  const char* parsePlainLine(const char* text, Event& event, bool& of_camera) const;
   std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
   std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
   std::string place(std::uint64_t line) const;
 
+  bool isOfCamera(std::string_view camera) const { return camera_.empty() || camera == camera_; }
+
   FileContent content_;
+  std::string camera_;
+  bool ignores_bad_lines_ = false;
   EventColumns columns_;
   BadEvents* bad_ = nullptr;
   bool usual_ = true;  // columns_.isUsual()
@@ -67,7 +81,12 @@ bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& 
 /// Returns the complete lines at the beginning of a text, also of a compressed one.
 std::string beginningOfText(const std::filesystem::path& file);
 
-/// Opens text files, one camera per file.
+/// Opens a text file: one camera, or a camera for each value of a column with the camera, in the
+/// natural order of these values.
+std::vector<std::unique_ptr<EventTextStream>> openEventText(const std::filesystem::path& file,
+                                                            const ReaderOptions& options);
+
+/// Opens text files one after the other.
 RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
                              const ReaderOptions& options);
 

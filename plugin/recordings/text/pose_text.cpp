@@ -6,12 +6,16 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "mapping/base/text.h"
+#include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/streams/pose_conflict.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
@@ -145,6 +149,12 @@ std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
   return lines;
 }
 
+/// Returns the beginning of an awk command for lines like this one.
+std::string awkFor(std::string_view line) {
+  const char* const separator = line.find(',') != line.npos ? " -F," : "";
+  return std::string("awk") + (line.find(';') != line.npos ? " -F';'" : separator);
+}
+
 /// Finds the exponent of the unit of times. @param columns may have the unit of the header.
 int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
                const std::filesystem::path& file, const ReaderOptions& options) {
@@ -166,6 +176,16 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
     const std::string_view t = fields[columns.column[0]];
     if (const auto value = parseFinite(t)) sample.add(*value, t);
   }
+  if (options.pose_time_unit.empty() && !lines.empty()) {
+    const std::string awk = awkFor(lines.front().text);
+    const std::size_t t = columns.column[0] + 1;
+    requireTimesOfPoses(
+        sample, file.string(),
+        fmt::format("with a file of the frames' times: {}{} 'NR==FNR {{t[FNR{}]=$1; next}} FNR>={} "
+                    "{{${}=t[${}+0]}} 1' TIMES FILE >NEW",
+                    awk, awk.size() > 3 ? fmt::format(" -v OFS={}", awk.substr(6)) : "",
+                    sample.earliest == 0 ? "-1" : "", lines.front().number, t, t));
+  }
   if (!sample.whole && options.pose_time_unit.empty()) {  // `time_unit` is for whole numbers
     requireSecondsOfPoses(sample, file.string());
     return 0;
@@ -174,15 +194,22 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
   return poseTimeExponent(options, sample, file.string());
 }
 
-std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::path& file,
-                                 const ReaderOptions& options) {
-  requireTextLines(text, file.string());
+/// The poses of a text, and their lines.
+struct PoseText {
   PoseColumns columns;
-  const std::vector<PoseLine> lines = poseLines(withoutByteOrderMark(text), columns, file.string());
-  const int exponent = exponentOf(lines, columns, file, options);
+  std::vector<PoseLine> lines;
   std::vector<StampedPose> poses;
-  poses.reserve(lines.size());
-  for (const PoseLine& line : lines) {
+};
+
+PoseText parsePoses(std::string_view text, const std::filesystem::path& file,
+                    const ReaderOptions& options) {
+  requireTextLines(text, file.string());
+  PoseText parsed;
+  PoseColumns& columns = parsed.columns;
+  parsed.lines = poseLines(withoutByteOrderMark(text), columns, file.string());
+  const int exponent = exponentOf(parsed.lines, columns, file, options);
+  parsed.poses.reserve(parsed.lines.size());
+  for (const PoseLine& line : parsed.lines) {
     try {
       std::vector<std::string_view> fields = poseFields(line.text);
       if (columns.named) {
@@ -197,13 +224,52 @@ std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::p
         throw std::runtime_error(
             "commas without a header: expected a header with the columns' names");
       }
-      poses.push_back(parseTumPose(fields, exponent));
-      poses.back().T_world_rig.translation.array() *= columns.metres.array();
+      parsed.poses.push_back(parseTumPose(fields, exponent));
+      parsed.poses.back().T_world_rig.translation.array() *= columns.metres.array();
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}:{}: {}", file.string(), line.number, error.what()));
     }
   }
-  return poses;
+  return parsed;
+}
+
+/// Returns a command that takes one trajectory out of a text, for an error.
+std::string remedyFor(const PoseConflict& conflict, const PoseText& text) {
+  const std::vector<PoseLine>& lines = text.lines;
+  const auto column = [&](std::size_t field) { return text.columns.column[field] + 1; };
+  const auto is_short = [&](std::size_t i) {
+    const std::string_view t = poseFields(lines[i].text)[text.columns.column[0]];
+    const std::string_view digits = t.substr(0, t.find_first_of("eE"));
+    return std::count_if(digits.begin(), digits.end(), [](char c) { return c != '.'; }) <= 6;
+  };
+  if (conflict.kind == PoseConflict::Kind::kEqualTimes && is_short(conflict.first) &&
+      std::abs(text.poses[conflict.first].t_ns) > 100 * kNanosecondsPerSecond) {
+    return "the times have six digits: write them with all, for example by numpy.savetxt(FILE, "
+           "poses, fmt='%.9f')";
+  }
+  const std::string awk = awkFor(lines.front().text);
+  const std::size_t first = lines.front().number;
+  std::string command;
+  if (conflict.kind == PoseConflict::Kind::kBackward) {
+    command = fmt::format("head -n {} FILE >NEW", lines[conflict.back].number - 1);
+  } else if (conflict.kind == PoseConflict::Kind::kEqualTimes) {
+    command = fmt::format("{} '!seen[${}]++' FILE >NEW", awk, column(0));
+  } else if (conflict.distance_m > conflict.angle_rad) {
+    const double half = conflict.distance_m / 2 / text.columns.metres[0];
+    command = fmt::format(
+        "{} 'NR <= {} || (${}-x)^2 + (${}-y)^2 + (${}-z)^2 < {:.3g} {{print; x=${}; y=${}; "
+        "z=${}}}' "
+        "FILE >NEW",
+        awk, first, column(1), column(2), column(3), half * half, column(1), column(2), column(3));
+  } else {
+    const double cosine = std::cos(conflict.angle_rad / 4);  // of half the angle in the middle
+    command = fmt::format(
+        "{} 'NR <= {} || (${}*a + ${}*b + ${}*c + ${}*d)^2 > {:.6f} {{print; a=${}; b=${}; c=${}; "
+        "d=${}}}' FILE >NEW",
+        awk, first, column(4), column(5), column(6), column(7), cosine * cosine, column(4),
+        column(5), column(6), column(7));
+  }
+  return "the poses of the first one: " + command;
 }
 
 }  // namespace
@@ -211,14 +277,22 @@ std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::p
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
                                       const ReaderOptions& options) {
   constexpr std::size_t kMaxBytes = 2'000'000'000;
-  return posesOf(FileContent(file).readAll(kMaxBytes), file, options);
+  const std::string content = FileContent(file).readAll(kMaxBytes);
+  PoseText text = parsePoses(content, file, options);
+  if (const auto conflict = findPoseConflict(text.poses)) {
+    throw std::runtime_error(fmt::format(
+        "{}: {} ({})", file.string(),
+        conflict->text([&](std::size_t i) { return fmt::format("line {}", text.lines[i].number); }),
+        remedyFor(*conflict, text)));
+  }
+  return std::move(text.poses);
 }
 
 bool looksLikePoseLines(std::string_view beginning) {
   ReaderOptions options;
   options.pose_time_unit = "ns";  // any unit: it does not matter here
   try {
-    return !posesOf(beginning, {}, options).empty();
+    return !parsePoses(beginning, {}, options).poses.empty();
   } catch (const std::runtime_error&) {
     return false;
   }

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <map>
 #include <random>
 #include <string>
@@ -88,7 +90,7 @@ RecordedMessage poseAt(const std::string& topic, const char* type, std::int64_t 
                        RosBytes kind) {
   RosMessage message(kind);
   message.header(t_ns);
-  if (type == std::string(kOdometry)) message.text("base");
+  if (type == std::string(kOdometry)) message.text("cam");
   message.pose({Eigen::Quaterniond::Identity(), {static_cast<double>(t_ns - kStartNs), 2, 3}});
   if (type == std::string(kOdometry)) message.numbers(std::vector<double>(78));
   return {topic, type, t_ns + kMsNs, message.bytes()};
@@ -381,17 +383,318 @@ TEST_F(BagRecording, TransformsGiveThePosesOfAFrame) {
         EXPECT_LT(differenceOf(T.inverse() * pose.T_world_rig).norm(), 1e-12) << frames;
       }
     }
-    const std::string frames =
-        "base->cam (constant), cam->wheel, odom->base, world->odom (constant)";
     const RecordingParts none = open({file});
     EXPECT_THAT(none.poses, IsEmpty());
-    EXPECT_THAT(none.expected_poses, HasSubstr("--topics \"/tf:PARENT->CHILD\", of " + frames));
-    for (const char* wrong : {"/tf:world->wheel", "/tf:nowhere->cam", "/tf:cam", "/tf:"}) {
+    EXPECT_THAT(none.expected_poses,
+                HasSubstr("--topics \"/tf:cam->wheel\", --topics \"/tf:odom->wheel\""));
+    const std::string frames =
+        "base->cam (constant), cam->wheel, odom->base, world->odom (constant)";
+    for (const char* wrong : {"/tf:nowhere->cam", "/tf:cam", "/tf:", "/tf:cam->"}) {
       EXPECT_THAT(errorOf([&] { open({file}, {wrong}); }),
                   AllOf(StartsWith(std::string("--topics ") + wrong), HasSubstr("of " + frames)));
     }
+    EXPECT_THAT(errorOf([&] { open({file}, {"/tf:base->cam"}); }), HasSubstr("constant"));
     EXPECT_THAT(errorOf([&] { open({file}, {"/other:world->cam"}); }),
                 HasSubstr("no topic /other"));
+  }
+}
+
+/// A robot: localisation map->odom (5 Hz, it jumps), odometry odom->base (20 Hz), a mast, and a
+/// camera whose transform was published backwards.
+class RobotBag {
+ public:
+  static constexpr int kPoses = 41;  // of the odometry
+
+  explicit RobotBag(RosBytes kind) : kind_(kind) {
+    messages = arraysOf("/left/events", packetsFrom(kStartNs, 200), kind);
+    transform("/tf_static", kStartNs, "base", "mast", T_base_mast);
+    transform("/tf_static", kStartNs, "/cam", "mast", T_mast_cam.inverse());
+    for (int i = 0; i < kPoses; ++i) {
+      transform("/tf", odomNs(i), "odom", "base", T_odom_base(odomNs(i)));
+    }
+    for (int i = 0; i < 10; ++i) {
+      transform("/tf", mapNs(i), "map", "odom", T_map_odom(i));
+      transform("/tf", mapNs(i), "base", "wheel", {rotationBy({0.5 * i, 0, 0}), {0, 1, 0}});
+    }
+  }
+  void transform(const char* topic, std::int64_t t_ns, const char* parent, const char* child,
+                 const Rigid3& T) {
+    RosMessage bytes(kind_);
+    bytes.u32(1).header(t_ns, parent).text(child).pose(T);
+    messages.push_back({topic, "tf2_msgs/TFMessage", t_ns, bytes.bytes()});
+  }
+  /// Adds a message of a pose. @param child empty: the type has none.
+  void pose(const char* topic, const char* type, std::int64_t t_ns, const char* frame,
+            const std::string& child, const Rigid3& T) {
+    RosMessage bytes(kind_);
+    bytes.header(t_ns, frame);
+    if (!child.empty()) bytes.text(child);
+    bytes.pose(T).numbers(std::vector<double>(78));
+    messages.push_back({topic, type, t_ns, bytes.bytes()});
+  }
+  void odometry(const char* child) {
+    for (int i = 0; i < kPoses; ++i) {
+      pose("/odom", kOdometry, odomNs(i), "odom", child, T_odom_base(odomNs(i)));
+    }
+  }
+
+  static std::int64_t odomNs(int i) { return kStartNs + i * 50 * kMsNs; }
+  static std::int64_t mapNs(int i) { return kStartNs + (100 + i * 200) * kMsNs; }
+  static Rigid3 T_odom_base(std::int64_t t_ns) {
+    const double t_s = 1e-9 * static_cast<double>(t_ns - kStartNs);
+    return {rotationBy({0, 0, 0.3 * t_s}), {t_s, 0.1 * t_s, 0}};
+  }
+  static Rigid3 T_map_odom(int i) {
+    return {rotationBy({0, 0, i > 5 ? 0.2 : 0.1}), {i > 5 ? 0.3 : 0.2, 1, 0}};
+  }
+  /// Returns T_map_odom between two messages, at a time that has both.
+  static Rigid3 T_map_odomAt(std::int64_t t_ns) {
+    const auto i = static_cast<int>((t_ns - mapNs(0)) / (200 * kMsNs));
+    const double part = 1e-9 * static_cast<double>(t_ns - mapNs(i)) / 0.2;
+    return part > 0 ? interpolate(T_map_odom(i), T_map_odom(i + 1), part) : T_map_odom(i);
+  }
+
+  const Rigid3 T_base_mast = {Eigen::Quaterniond(0.8, 0, 0.6, 0), {0.5, 0, 1}};
+  const Rigid3 T_mast_cam = {Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {0, 0.2, 0}};
+  const Rigid3 T_base_cam = T_base_mast * T_mast_cam;
+  RecordedMessages messages;
+
+ private:
+  RosBytes kind_;
+};
+
+TEST_F(BagRecording, ChainsOfTransformsEndInTheFrameOfTheEvents) {
+  const auto expectPoses = [](const RecordingParts& parts, int first, int count,
+                              const std::function<Rigid3(std::int64_t)>& T_world_rig,
+                              const std::string& what) {
+    ASSERT_EQ(parts.poses.size(), static_cast<std::size_t>(count)) << what;
+    for (int i = 0; i < count; ++i) {
+      const StampedPose& pose = parts.poses[static_cast<std::size_t>(i)];
+      ASSERT_EQ(pose.t_ns, RobotBag::odomNs(first + i)) << what;
+      const Rigid3 error = T_world_rig(pose.t_ns).inverse() * pose.T_world_rig;
+      ASSERT_LT(differenceOf(error).norm(), 1e-9) << what << " " << i;
+    }
+  };
+  for (const Container container : kContainers) {
+    const auto opened = [&](const RobotBag& bag, const std::vector<std::string>& topics = {},
+                            bool hand_eye = false) {
+      ReaderOptions options;
+      options.topics = topics;
+      options.has_hand_eye = hand_eye;
+      return openBags({write("bag", container, together(bag.messages, {}))}, options);
+    };
+    const RobotBag robot(bytesOf(container));
+    const auto T_odom_cam = [&](std::int64_t t_ns) {
+      return RobotBag::T_odom_base(t_ns) * robot.T_base_cam;
+    };
+    const auto T_map_cam = [&](std::int64_t t_ns) {
+      return RobotBag::T_map_odomAt(t_ns) * T_odom_cam(t_ns);
+    };
+    for (const char* frames : {"/tf:map->cam", "/tf:/map->/cam", "/tf:map->base",
+                               "/tf:map->odom->base->mast->cam", "/tf:map->mast"}) {
+      const RecordingParts parts = opened(robot, {frames});
+      expectPoses(parts, 2, 37, T_map_cam, frames);
+      ASSERT_EQ(parts.notes.size(), 1U) << "the localisation begins later and ends earlier";
+      EXPECT_THAT(parts.notes[0].text, HasSubstr("4 poses are left out"));
+    }
+    expectPoses(opened(robot, {"/tf:odom->cam"}), 0, RobotBag::kPoses, T_odom_cam, "odom->cam");
+    EXPECT_THAT(
+        errorOf([&] { opened(robot, {"/tf:cam->map"}); }),
+        HasSubstr("expected the camera's poses, --topics \"/tf:map->odom->base->mast->cam\""));
+    const RecordingParts none = opened(robot);
+    EXPECT_THAT(none.poses, IsEmpty());
+    EXPECT_THAT(none.expected_poses,
+                HasSubstr("--topics \"/tf:odom->cam\", --topics \"/tf:map->cam\""));
+
+    RobotBag odometry = robot;
+    odometry.odometry("base");
+    RecordingParts parts = opened(odometry);
+    expectPoses(parts, 0, RobotBag::kPoses, T_odom_cam, "odometry of the base");
+    EXPECT_THAT(parts.warnings, IsEmpty());
+    EXPECT_THAT(parts.notes, IsEmpty());
+    parts = opened(odometry, {}, true);
+    expectPoses(parts, 0, RobotBag::kPoses, RobotBag::T_odom_base, "with a hand-eye transform");
+    ASSERT_EQ(parts.notes.size(), 1U);
+    EXPECT_THAT(parts.notes[0].text, HasSubstr("--hand-eye replaces the transform base->cam"));
+
+    RobotBag other = robot;
+    other.odometry("body");
+    parts = opened(other);
+    expectPoses(parts, 0, RobotBag::kPoses, RobotBag::T_odom_base, "odometry of another frame");
+    ASSERT_EQ(parts.warnings.size(), 1U);
+    EXPECT_EQ(parts.warnings[0].name, "pose-frame");
+    EXPECT_THAT(parts.warnings[0].text, AllOf(HasSubstr("frame body"), HasSubstr("frame cam"),
+                                              HasSubstr("--hand-eye FILE")));
+    EXPECT_THAT(opened(other, {}, true).warnings, IsEmpty());
+
+    RobotBag seen(bytesOf(container));  // a tag that the camera sees, and the camera's own poses
+    for (int i = 0; i < RobotBag::kPoses; ++i) {
+      const std::int64_t t_ns = RobotBag::odomNs(i);
+      seen.pose("/tag", "geometry_msgs/TransformStamped", t_ns, "cam", "tag",
+                T_odom_cam(t_ns).inverse());
+    }
+    expectPoses(opened(seen), 0, RobotBag::kPoses, T_odom_cam, "poses of a tag");
+  }
+}
+
+TEST_F(BagRecording, TransformsThatContradictEachOtherAreErrors) {
+  const auto errorOfBag = [&](const RobotBag& bag, const std::vector<std::string>& topics) {
+    return errorOf(
+        [&] { open({write("bag", Container::kMcap, together(bag.messages, {}))}, topics); });
+  };
+  const RobotBag robot(RosBytes::kCdr);
+  RobotBag moved = robot;
+  moved.transform("/tf_static", kStartNs + 5 * kMsNs, "base", "mast",
+                  {{1, 0, 0, 0}, {0.5, 0.1, 1}});
+  EXPECT_THAT(errorOfBag(moved, {"/tf:map->cam"}),
+              AllOf(HasSubstr("base->mast is constant, but has another value at 1700000000.005"),
+                    HasSubstr("--hand-eye FILE")));
+  RobotBag repeated = robot;
+  repeated.transform("/tf_static", kStartNs + 5 * kMsNs, "base", "mast",
+                     {robot.T_base_mast.rotation, robot.T_base_mast.translation * 1.0001});
+  EXPECT_EQ(errorOfBag(repeated, {"/tf:map->cam"}), "no error");
+  RobotBag twice = robot;  // a second publisher of the odometry
+  for (int i = 0; i + 1 < RobotBag::kPoses; ++i) {
+    const std::int64_t t_ns = RobotBag::odomNs(i) + 3 * kMsNs;
+    twice.transform("/tf", t_ns, "odom", "base", {{1, 0, 0, 0}, {0, 3, 0}});
+  }
+  EXPECT_THAT(errorOfBag(twice, {"/tf:map->cam"}),
+              HasSubstr("the transform odom->base: the poses of two bodies"));
+  RobotBag ways = robot;
+  for (int i = 0; i < RobotBag::kPoses; ++i) {
+    ways.transform("/tf", RobotBag::odomNs(i), "gps", "base",
+                   RobotBag::T_odom_base(RobotBag::odomNs(i)));
+  }
+  ways.transform("/tf_static", kStartNs, "map", "gps", {});
+  const std::string error = errorOfBag(ways, {"/tf:map->cam"});
+  EXPECT_THAT(error, HasSubstr("several ways from map to cam: expected one of"));
+  for (const char* way : {"map->gps->base->mast->cam", "map->odom->base->mast->cam"}) {
+    EXPECT_THAT(error, HasSubstr(way));
+    EXPECT_EQ(errorOfBag(ways, {std::string("/tf:") + way}), "no error")
+        << "the way that the error names";
+  }
+  ways.transform("/tf", kStartNs, "map", "base", {});
+  ways.transform("/tf", kStartNs + 9 * kMsNs, "map", "base", {{1, 0, 0, 0}, {0, 0, 0.001}});
+  const RecordingParts named =
+      open({write("bag", Container::kMcap, together(ways.messages, {}))}, {"/tf:map->base"});
+  EXPECT_EQ(named.poses.size(), 2U) << "the transform of just these two frames";
+  RobotBag bodies = robot;
+  bodies.odometry("base");
+  bodies.pose("/odom", kOdometry, kStartNs + 7 * kMsNs, "odom", "other", {});
+  EXPECT_THAT(errorOfBag(bodies, {}),
+              HasSubstr("poses of 'other' in 'odom' beside poses of 'base'"));
+}
+
+TEST_F(BagRecording, CamerasFramesAreComparedWithTheirCalibration) {
+  for (const double apart_m : {0.1, 0.109, 0.111, -0.1}) {
+    RobotBag robot(RosBytes::kCdr);
+    for (int i = 0; i < 200; ++i) {
+      const auto events = someEvents(kStartNs + i * 10 * kMsNs, 10 * kMsNs, 50);
+      robot.messages.push_back({"/right/events", kArray, events.back().t_ns,
+                                eventArray(RosBytes::kCdr, events, "right")});
+    }
+    robot.transform("/tf_static", kStartNs, "mast", "right",
+                    robot.T_mast_cam * Rigid3{{1, 0, 0, 0}, {apart_m, 0, 0}});
+    writeFile(folder() / "camchain.yaml",
+              "cam0: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], "
+              "intrinsics: [226, 226, 173, 130], resolution: [346, 260]}\n"
+              "cam1: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], "
+              "intrinsics: [226, 226, 173, 130], resolution: [346, 260], T_cn_cnm1: [[1, 0, 0, "
+              "-0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}\n");
+    RecordingSource source;
+    source.files = {write("bag", Container::kMcap, together(robot.messages, {}))};
+    source.calibration = folder() / "camchain.yaml";
+    source.reader.topics = {"/tf:map->cam"};
+    const std::vector<Warning> warnings = openRecording(source)->counts().warnings;
+    if (std::abs(apart_m - 0.1) < 0.01) {
+      EXPECT_THAT(warnings, IsEmpty()) << apart_m;
+    } else {
+      ASSERT_EQ(warnings.size(), 1U) << apart_m;
+      EXPECT_EQ(warnings[0].name, "camera-frame");
+      EXPECT_THAT(warnings[0].text, HasSubstr("camera 1 is 0."));
+    }
+    // The poses may be in another bag than the events and the constant transforms.
+    RecordedMessages events, poses;
+    for (const RecordedMessage& message : robot.messages) {
+      (message.topic == "/tf" ? poses : events).push_back(message);
+    }
+    source.files = {write("events", Container::kMcap, together(events, {}))};
+    source.poses = write("poses", Container::kMcap, together(poses, {}));
+    const auto recording = openRecording(source);
+    std::size_t count = 0;
+    while (const auto sample = recording->next()) {
+      const auto* pose = std::get_if<PoseSample>(&*sample);
+      if (pose == nullptr) continue;
+      ++count;
+      const Rigid3 T_map_cam =
+          RobotBag::T_map_odomAt(pose->t_ns) * RobotBag::T_odom_base(pose->t_ns) * robot.T_base_cam;
+      EXPECT_LT(differenceOf(T_map_cam.inverse() * pose->T_world_body).norm(), 1e-6);
+    }
+    EXPECT_EQ(count, 37U);
+  }
+}
+
+TEST_F(BagRecording, AllMessagesOfAPathCount) {
+  const auto T_world_rig = [](int i, double y = 0) {
+    return Rigid3{{1, 0, 0, 0}, {0.01 * i, y, 0}};
+  };
+  const auto path = [&](const char* topic, int at, int first, int end, double y,
+                        std::int64_t stamp_ns = -1) {
+    RosMessage message(RosBytes::kCdr);
+    const std::int64_t now_ns = kStartNs + at * 10 * kMsNs;
+    message.header(now_ns, "world").u32(static_cast<std::size_t>(end - first));
+    for (int i = first; i < end; ++i) {
+      message.header(stamp_ns < 0 ? kStartNs + i * 10 * kMsNs : stamp_ns, "world");
+      message.pose(T_world_rig(i, y));
+    }
+    return RecordedMessage{topic, "nav_msgs/Path", now_ns, message.bytes()};
+  };
+  struct Case {
+    const char* name;
+    std::vector<RecordedMessage> messages;
+    std::size_t poses;
+    std::string said;
+  };
+  std::vector<Case> cases = {{"growing", {}, 100, ""},
+                             {"sliding", {}, 100, ""},
+                             {"started anew", {}, 100, ""},
+                             {"corrected", {}, 100, ""},
+                             {"a plan", {}, 0, "/path is no trajectory: its poses have no times"},
+                             {"a plan with times", {}, 0, "its poses lie ahead"}};
+  for (int i = 1; i <= 100; ++i) {
+    cases[0].messages.push_back(path("/path", i, 0, i, 0));
+    cases[1].messages.push_back(path("/path", i, std::max(0, i - 20), i, 0));
+    cases[2].messages.push_back(path("/path", i, i > 70 ? 70 : 0, i, 0));
+    cases[3].messages.push_back(path("/path", i, 0, i, i == 100 ? 0 : 1));
+    cases[4].messages.push_back(path("/path", i, i, i + 50, 0, kStartNs + i * 10 * kMsNs));
+    cases[5].messages.push_back(path("/path", i, i, i + 50, 0));
+  }
+  for (const Case& each : cases) {
+    const RecordingParts parts = open({write("bag", Container::kMcap, each.messages)});
+    ASSERT_EQ(parts.poses.size(), each.poses) << each.name;
+    for (std::size_t i = 0; i < each.poses; ++i) {
+      EXPECT_EQ(parts.poses[i].t_ns, kStartNs + static_cast<std::int64_t>(i) * 10 * kMsNs);
+      EXPECT_TRUE(isSame(parts.poses[i].T_world_rig, T_world_rig(static_cast<int>(i)))) << i;
+    }
+    EXPECT_THAT(parts.expected_poses, HasSubstr(each.said));
+    if (each.poses > 0) continue;
+    // The tracker's topic is used, and the plan is named.
+    RecordedMessages both = each.messages;
+    for (int i = 0; i < 20; ++i) {
+      both.push_back({"/tracker", kPose, kStartNs + i * 50 * kMsNs,
+                      poseStamped(RosBytes::kCdr, kStartNs + i * 50 * kMsNs, T_world_rig(i))});
+    }
+    const RecordingParts tracked = open({write("bag", Container::kMcap, together(both, {}))});
+    EXPECT_EQ(tracked.poses.size(), 20U) << each.name;
+    ASSERT_EQ(tracked.warnings.size(), 1U);
+    EXPECT_THAT(tracked.warnings[0].text, AllOf(HasSubstr("of /tracker"), HasSubstr(each.said)));
+    RecordingSource source;
+    source.files = {write("events", Container::kMcap,
+                          arraysOf("/events", packetsFrom(kStartNs, 90), RosBytes::kCdr))};
+    source.poses = write("bag", Container::kMcap, together(both, {}));
+    source.complete = false;
+    ASSERT_EQ(openRecording(source)->counts().warnings.size(), 1U) << "a bag given by --poses";
+    EXPECT_EQ(openRecording(source)->counts().warnings[0].name, "pose-topic");
   }
 }
 

@@ -71,9 +71,10 @@ class RosMessage {
 };
 
 /// Returns a dvs_msgs/EventArray of a sensor of 346x260 pixels.
-inline std::string eventArray(RosBytes kind, const std::vector<Event>& events) {
+inline std::string eventArray(RosBytes kind, const std::vector<Event>& events,
+                              const std::string& frame = "cam") {
   RosMessage message(kind);
-  message.header(events.empty() ? 0 : events.front().t_ns).u32(260).u32(346).u32(events.size());
+  message.header(events.empty() ? 0 : events.front().t_ns, frame).u32(260).u32(346).u32(events.size());
   for (const Event& event : events) {
     message.u16(event.x).u16(event.y).time(event.t_ns).u8(event.polarity ? 1 : 0);
   }

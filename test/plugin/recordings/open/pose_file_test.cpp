@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -218,6 +220,116 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
   EXPECT_THAT(errorOf([&] { readPoses(folder() / "d.zip"); }), HasSubstr("several files in it"));
   EXPECT_THAT(errorOf([&] { readPoses(folder() / "nowhere"); }),
               HasSubstr("nowhere: cannot be opened for reading"));
+}
+
+/// A body that moves by 1 m/s, 100 times a second from 5 s on.
+std::string poseLine(double t_s, double y, const char* separator = " ", const char* more = "") {
+  return fmt::format("{:.6f}{}{:.4f}{}{:.3f}{}0.5{}0{}0{}0{}1{}\n", t_s, separator, t_s, separator,
+                     y, separator, separator, separator, separator, separator, more);
+}
+
+TEST_F(PoseFile, OneFileHasOneTrajectoryAndAnErrorTellsHowToTakeIt) {
+  const auto lines = [](int count, double first_s, double y) {
+    std::string text;
+    for (int i = 0; i < count; ++i) text += poseLine(first_s + 0.01 * i, y);
+    return text;
+  };
+  std::string alternating, sparse, equal, csv = "name,t,x,y,z,qx,qy,qz,qw\n", few, turned;
+  for (int i = 0; i < 300; ++i) {
+    const double t_s = 5 + 0.01 * i;
+    alternating += poseLine(t_s, 0) + poseLine(t_s + 30e-6, 1);
+    sparse += poseLine(t_s, 0) + (i % 10 == 5 ? poseLine(t_s + 0.004, -0.3) : "");
+    equal += poseLine(t_s, 0) + poseLine(t_s, 0.002);
+    csv += "1," + poseLine(t_s, 0, ",") + "2," + poseLine(t_s + 0.005, 2, ",");
+    few += poseLine(t_s, 0) + (i % 150 == 5 ? poseLine(t_s, 1) : "");
+    turned += poseLine(t_s, 0) + fmt::format("{:.6f} {:.4f} 0 0.5 0 0.6 0 0.8\n", t_s + 0.004, t_s);
+  }
+  const struct {
+    const char* name;
+    std::string text;
+    const char* error;   // null: none
+    const char* places;  // in the error
+  } rows[] = {
+      {"alternating", alternating, "the poses of two bodies: 598 of 600 poses", "line 3"},
+      {"sparse", sparse, "the poses of two bodies", "line 6"},
+      {"equal times", equal, "300 of 300 times have poses that differ", "line 1 and line 2"},
+      {"with a header", csv, "the poses of two bodies", "line 4"},
+      {"turned", turned, "0 m and 73.7 degrees apart", "line 3"},
+      {"one after the other", lines(300, 5, 0) + lines(300, 5.5, 1),
+       "the times go back at line 301", "line 301 and line 51"},
+      {"a clock that was set back by 0.2 s", lines(3000, 5, 0) + lines(3000, 34.8, 0.2),
+       "the times go back at line 3001", "0.2"},
+      {"few equal times", few, nullptr, ""},
+      {"two parts in another order", lines(300, 8, 0) + lines(300, 5, 0), nullptr, ""},
+      {"one body twice", lines(300, 5, 0) + lines(300, 5, 0.0005), nullptr, ""},
+  };
+  const std::size_t count = readPoses(write("first.txt", lines(300, 5, 0))).size();
+  for (const auto& row : rows) {
+    const std::string name = row.name == std::string("with a header") ? "a.csv" : "a.txt";
+    const std::string error = errorOfFile(name, row.text);
+    if (row.error == nullptr) {
+      EXPECT_EQ(error, "") << row.name;
+      continue;
+    }
+    EXPECT_THAT(error, AllOf(HasSubstr(name + ": "), HasSubstr(row.error), HasSubstr(row.places)))
+        << row.name;
+    // The command in the error is followed to the letter.
+    const std::string marker = "the poses of the first one: ";
+    ASSERT_THAT(error, HasSubstr(marker)) << row.name;
+    std::string command = error.substr(error.find(marker) + marker.size());
+    command.pop_back();  // the bracket
+    command.replace(command.find("FILE"), 4, (folder() / name).string());
+    command.replace(command.find("NEW"), 3, (folder() / "new.csv").string());
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    const auto poses = readPoses(folder() / "new.csv");
+    EXPECT_GE(poses.size(), count) << row.name << ": " << command;
+    for (const StampedPose& pose : poses) {
+      EXPECT_LE(std::abs(pose.T_world_rig.translation.y()), 1e-9) << row.name << ": " << command;
+    }
+  }
+}
+
+TEST_F(PoseFile, TimesOfPosesAreNeitherNumbersOfFramesNorOneTime) {
+  const auto file = [](const std::vector<std::string>& times) {
+    std::string text = "# t tx ty tz qx qy qz qw\n";
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      text += fmt::format("{} {} 0 0 0 0 0 1\n", times[i], 0.01 * static_cast<double>(i));
+    }
+    return text;
+  };
+  std::vector<std::string> frames, decimals, keyframes, dates, six, milliseconds;
+  for (int i = 0; i < 200; ++i) {
+    frames.push_back(std::to_string(i));
+    decimals.push_back(fmt::format("{}.0", i));
+    if (i % 7 < 2) keyframes.push_back(fmt::format("{}.000000", i));
+    dates.push_back(fmt::format("{:g}", 1.7e9 + 0.01 * i));
+    six.push_back(fmt::format("{:g}", 12345.6 + 0.01 * i));
+    milliseconds.push_back(std::to_string(17'000 + 5 * i));
+  }
+  EXPECT_THAT(errorOfFile("a.txt", file(dates)),
+              HasSubstr("the first 100 poses have one time, 1.7"));
+  EXPECT_THAT(errorOfFile("a.txt", file(six)), HasSubstr("the times have six digits: write"));
+  EXPECT_THAT(errorOfFile("a.txt", file(milliseconds)), HasSubstr("--pose-time-unit ms"));
+  std::string times;
+  for (int i = 0; i < 200; ++i) times += fmt::format("{:.3f}\n", 100 + 0.02 * i);
+  write("times.txt", times);
+  for (const auto& numbers : {frames, decimals, keyframes}) {
+    const std::string error = errorOfFile("a.txt", file(numbers));
+    EXPECT_THAT(error, HasSubstr("numbers of frames?"));
+    std::string command = error.substr(error.find("awk"));
+    command.resize(command.find("NEW)"));
+    command.replace(command.find("TIMES"), 5, (folder() / "times.txt").string());
+    command.replace(command.find("FILE"), 4, (folder() / "a.txt").string());
+    ASSERT_EQ(std::system((command + (folder() / "new.txt").string()).c_str()), 0) << command;
+    const auto poses = readPoses(folder() / "new.txt");
+    ASSERT_EQ(poses.size(), numbers.size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      EXPECT_EQ(poses[i].t_ns, 100'000'000'000 + 20'000'000 * std::stoll(numbers[i]));
+    }
+    ReaderOptions options;
+    options.pose_time_unit = "s";
+    EXPECT_EQ(readPoses(folder() / "a.txt", options).size(), numbers.size()) << "they are seconds";
+  }
 }
 
 using namespace std::string_literals;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -251,7 +254,9 @@ TEST_F(PacketsOfText, AnIntervalHasItsEventsInOrderThoughTheyComeLate) {
 }
 
 TEST_F(PacketsOfText, BadEventsAreLeftOutUpToTheLimitOfAllCameras) {
-  const std::string good = "0.1 1 2 0\n0.2 3 4 1\n";
+  std::string good;  // of 100 events, one may be late
+  for (int i = 0; i < 98; ++i) good += "0.1 1 2 0\n";
+  good += "0.2 3 4 1\n";
   const std::string bad = "0.2 3 4\nnan 3 4 1\n0.2 300 4 1\n0.2 3 8 1\n0.18 3 4 1\n";
   for (const char* name : {"cam0.txt", "cam1.txt"}) {
     writeFile(folder() / name, good + bad + "0.3 5 6 0\n0.4 5");
@@ -266,17 +271,70 @@ TEST_F(PacketsOfText, BadEventsAreLeftOutUpToTheLimitOfAllCameras) {
     return count;
   };
   BadEvents twelve(12);
-  EXPECT_EQ(read_both(twelve), 6U);
+  EXPECT_EQ(read_both(twelve), 200U);
   EXPECT_EQ(twelve.count(), 12U);
-  EXPECT_THAT(twelve.first(), HasSubstr("cam0.txt:3: '0.2 3 4': expected 4 fields"));
+  EXPECT_THAT(twelve.first(), HasSubstr("cam0.txt:100: '0.2 3 4': expected 4 fields"));
   BadEvents eleven(11);
   EXPECT_THAT(errorOf([&] { read_both(eleven); }),
-              AllOf(HasSubstr("cam1.txt:7: t = '0.18"),
+              AllOf(HasSubstr("cam1.txt:104: t = '0.18"),
                     HasSubstr("(11 bad events before it were left out")));
   BadEvents none(0);
   EXPECT_THAT(
       errorOf([&] { read_both(none); }),
-      AllOf(HasSubstr("cam0.txt:3: "), HasSubstr("(--skip-bad-events N leaves out up to N")));
+      AllOf(HasSubstr("cam0.txt:100: "), HasSubstr("(--skip-bad-events N leaves out up to N")));
+}
+
+TEST_F(PacketsOfText, ManyLateEventsAreAnErrorThatSortsTheFile) {
+  std::vector<std::pair<double, std::string>> events;  // pictures of 30 ms, each by column
+  for (int i = 0; i < 3000; ++i) events.emplace_back(5 + 1e-4 * i, fmt::format("{} 7 1", i % 300));
+  std::vector<std::pair<double, std::string>> disordered = events;
+  for (int i = 0; i < 3000; i += 300) std::reverse(&disordered[i], &disordered[i] + 300);
+  for (const auto& [name, separator, header] :
+       {std::tuple("a.txt", " ", ""), std::tuple("a.csv", ",", "t,x,y,p\n")}) {
+    const auto textOf = [&, sep = std::string(separator),
+                         head = std::string(header)](const auto& all) {
+      std::string text = head;
+      for (auto [t_s, rest] : all) {
+        std::replace(rest.begin(), rest.end(), ' ', sep[0]);
+        text += fmt::format("{:.6f}{}{}\n", t_s, sep, rest);
+      }
+      return text;
+    };
+    const auto read = [&](const char* file, std::uint64_t limit) {
+      BadEvents bad(limit);
+      EventPackets packets(std::make_unique<EventTextStream>(folder() / file), {300, 8});
+      packets.skipBadEvents(bad);
+      return readPackets(packets);
+    };
+    writeFile(folder() / "sorted", textOf(events));
+    const std::vector<Event> all = read("sorted", 0);
+    writeFile(folder() / name, textOf(disordered));
+    for (const std::uint64_t limit : {0U, 100'000U}) {
+      const std::string error = errorOf([&] { read(name, limit); });
+      EXPECT_THAT(error, HasSubstr(name));
+      EXPECT_THAT(error,
+                  HasSubstr(limit == 0 ? "events in time order" : "events are over 10 ms late"));
+      const std::size_t begin = error.find("this sorts them: ") + 17;
+      std::string command = error.substr(begin, error.find(">NEW") + 4 - begin);
+      for (std::size_t at; (at = command.find("FILE")) != std::string::npos;) {
+        command.replace(at, 4, (folder() / name).string());
+      }
+      command.replace(command.find("NEW"), 3, (folder() / "new").string());
+      ASSERT_EQ(std::system(("bash -c \"" + command + "\"").c_str()), 0) << command;
+      EXPECT_TRUE(read("new", 0) == all) << command;
+    }
+    // Late events in a burst, more and less than 1 %.
+    for (const int late : {29, 31}) {
+      std::vector<std::pair<double, std::string>> burst = events;
+      for (int i = 0; i < late; ++i) burst[2000 + i].first -= 0.1;
+      writeFile(folder() / name, textOf(burst));
+      if (late == 29) {
+        EXPECT_EQ(read(name, 1000).size(), 2971U);
+      } else {
+        EXPECT_THAT(errorOf([&] { read(name, 1000); }), HasSubstr("31 of 3000 events"));
+      }
+    }
+  }
 }
 
 /// Returns `count` times from `first` on. A negative step gives falling times.

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/text/event_text.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <rapidcheck/gtest.h>
 #include <algorithm>
+#include <map>
+#include <random>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/event_packets.h"
@@ -112,6 +115,65 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
     EXPECT_THAT(error, StartsWith(line(wrong.line)));
     for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
+}
+
+TEST_F(EventText, AColumnWithTheCameraDividesAFile) {
+  std::mt19937 random(3);
+  const std::vector<std::vector<std::string>> names = {
+      {"0", "1"}, {"2", "10", "7"}, {"left", "right"}, {"5"}};  // shares of 60,000
+  for (const auto& cameras : names) {
+    for (const bool one_after_the_other : {false, true}) {
+      std::map<std::string, std::vector<Event>> expected;
+      std::string text = "timestamp,x,y,polarity,camera_id\n";
+      const std::size_t part = 60'000 / cameras.size();
+      for (std::size_t i = 0; i < 60'000; ++i) {
+        const std::size_t camera = one_after_the_other ? i / part : random() % cameras.size();
+        const std::size_t step = one_after_the_other ? i % part : i;  // each begins anew
+        const Event event = {static_cast<std::int64_t>(step) * 10'000,
+                             static_cast<std::uint16_t>(i % 240), 5, i % 2 == 0};
+        expected[cameras[camera]].push_back(event);
+        text += fmt::format("{},{},5,{},{}\n", formatSeconds(event.t_ns), event.x,
+                            event.polarity ? 1 : 0, cameras[camera]);
+      }
+      writeFile(folder() / "a.csv", text);
+      auto streams = openEventText(folder() / "a.csv", {});
+      ASSERT_EQ(streams.size(), cameras.size());
+      std::vector<std::string> order = cameras;
+      std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+        return std::make_pair(a.size(), a) < std::make_pair(b.size(), b);
+      });
+      for (std::size_t i = 0; i < streams.size(); ++i) {
+        const std::vector<Event>& all = expected[order[i]];
+        for (const std::size_t from : {std::size_t{0}, all.size() / 3, all.size() - 5}) {
+          ReaderOptions options;
+          EventPackets packets(std::move(openEventText(folder() / "a.csv", options)[i]),
+                               {240, 180});
+          packets.startAt(all[from].t_ns);
+          const std::vector<Event> events = readPackets(packets);
+          ASSERT_EQ(events,
+                    std::vector<Event>(all.begin() + static_cast<std::ptrdiff_t>(from), all.end()))
+              << order[i];
+        }
+      }
+    }
+  }
+  // A line that is broken is one bad event, whoever it belongs to.
+  writeFile(folder() / "a.csv", "t,x,y,p,cam\n0.1,1,1,1,0\n0.1,1,1\n0.2,1,1,1,1\n0.2,999,1,1,1\n");
+  BadEvents bad(10);
+  for (auto& stream : openEventText(folder() / "a.csv", {})) {
+    EventPackets packets(std::move(stream), {240, 180});
+    packets.skipBadEvents(bad);
+    EXPECT_EQ(readPackets(packets).size(), 1U);
+  }
+  EXPECT_EQ(bad.count(), 2U);
+  ReaderOptions options;
+  options.columns = "t x y p -";
+  EXPECT_EQ(openEventText(folder() / "a.csv", options).size(), 1U) << "the user ignores it";
+  std::string many = "t,x,y,p,cam\n";
+  for (int i = 0; i < 70; ++i) many += fmt::format("0.{},1,1,1,{}\n", 100 + i, i);
+  writeFile(folder() / "a.csv", many);
+  EXPECT_THAT(errorOf([&] { openEventText(folder() / "a.csv", {}); }),
+              HasSubstr("a.csv: column 5: over 64 cameras: expected"));
 }
 
 TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/geometry/trajectory_check.h"
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+double metresBetween(const StampedPose& a, const StampedPose& b) {
+  return (a.T_world_rig.translation - b.T_world_rig.translation).norm();
+}
+double angleBetween(const StampedPose& a, const StampedPose& b) {
+  return a.T_world_rig.rotation.angularDistance(b.T_world_rig.rotation);
+}
+/// Metres and radians together: the motion of a point at 1 m.
+double distanceBetween(const StampedPose& a, const StampedPose& b) {
+  return metresBetween(a, b) + angleBetween(a, b);
+}
+
+/// Counts a conflict; keeps the numbers of its first two poses.
+void count(const StampedPose& a, std::size_t first, const StampedPose& b, std::size_t second,
+           TrajectoryConflict& conflict) {
+  if (conflict.count++ > 0) return;
+  conflict.first = first;
+  conflict.second = second;
+  conflict.distance_m = metresBetween(a, b);
+  conflict.angle_rad = angleBetween(a, b);
+}
+
+/// Returns whether three poses need an acceleration over 400 m/s² and rad/s², 40 g.
+bool isViolent(const StampedPose& a, const StampedPose& b, const StampedPose& c) {
+  constexpr double kMaxAcceleration = 400;
+  const auto motion = [](const StampedPose& from, const StampedPose& to) {
+    return differenceOf(from.T_world_rig.inverse() * to.T_world_rig);
+  };
+  const double before_s = secondsBetween(a.t_ns, b.t_ns);
+  const double after_s = secondsBetween(b.t_ns, c.t_ns);
+  const Vector6d change = motion(b, c) * before_s - motion(a, b) * after_s;
+  return change.head<3>().norm() + change.tail<3>().norm() >
+         kMaxAcceleration * before_s * after_s * (before_s + after_s) / 2;
+}
+
+}  // namespace
+
+void TrajectoryCheck::add(const StampedPose& pose) {
+  constexpr std::size_t kLastPoses = 32;
+  compareWithSameTime(pose);
+  if (!last_.empty()) lookForChange(pose);
+  last_.push_back(pose);
+  if (last_.size() > kLastPoses) last_.pop_front();
+  ++changes_.of;
+}
+
+void TrajectoryCheck::compareWithSameTime(const StampedPose& pose) {
+  constexpr double kSameM = 1e-3;
+  constexpr double kSameRad = 0.1 * kRadiansPerDegree;
+  if (last_.empty() || pose.t_ns != of_time_.t_ns) {
+    of_time_ = pose;
+    of_time_number_ = changes_.of;
+    differs_ = false;
+    ++equal_times_.of;
+  } else if (!differs_ &&
+             (metresBetween(of_time_, pose) > kSameM || angleBetween(of_time_, pose) > kSameRad)) {
+    differs_ = true;
+    count(of_time_, of_time_number_, pose, changes_.of, equal_times_);
+  }
+}
+
+/// Looks whether the newest pose leaves the place of the pose before it for an earlier place.
+void TrajectoryCheck::lookForChange(const StampedPose& pose) {
+  constexpr double kMinDistance = 0.02;
+  constexpr std::int64_t kMaxTimeNs = 500'000'000;  // between two poses of one place
+  constexpr std::size_t kMaxBodies = 8;             // with one pose each between two poses
+  const StampedPose& before = last_.back();
+  const double distance = distanceBetween(before, pose);
+  if (distance < kMinDistance || last_.size() < 2) return;
+  if (!isViolent(last_[last_.size() - 2], before, pose)) return;
+  for (std::size_t i = last_.size() - 1; i-- > 0;) {
+    const StampedPose& earlier = last_[i];
+    if (pose.t_ns - earlier.t_ns > kMaxTimeNs) return;
+    if (distanceBetween(earlier, pose) < distance / 4) {
+      return count(before, changes_.of - 1, pose, changes_.of, changes_);
+    }
+    // Farther back than the places of several bodies, there are only poses of the place before.
+    if (i + kMaxBodies < last_.size() && distanceBetween(earlier, before) > distance / 2) return;
+  }
+}
+
+std::optional<TrajectoryConflict> TrajectoryCheck::conflict() const {
+  constexpr std::uint64_t kMinChanges = 8;
+  if (100 * equal_times_.count > equal_times_.of) return equal_times_;
+  if (changes_.count >= kMinChanges && 20 * changes_.count > changes_.of) return changes_;
+  return std::nullopt;
+}
+
+}  // namespace efm
