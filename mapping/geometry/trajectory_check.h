@@ -39,8 +39,6 @@ class TrajectoryCheck {
 
   /// Returns the conflict of the poses so far.
   std::optional<TrajectoryConflict> conflict() const;
-  /// Returns the changes between two places so far, also if they are too few for a conflict.
-  const TrajectoryConflict& changes() const { return changes_; }
 
  private:
   void compareWithSameTime(const StampedPose& pose);

@@ -7,7 +7,6 @@
 #include <exception>
 #include <fstream>
 #include <iterator>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -97,29 +96,13 @@ void printPoses(const RecordingStatistics& statistics) {
              statistics.eventsBeforePoses(), statistics.eventsAfterPoses());
 }
 
-/// Prints the frames below a frame, a line each.
-void printFrames(const std::vector<RecordedTransform>& transforms, const std::string& parent,
-                 std::size_t depth, int& lines) {
-  constexpr std::size_t kDeepest = 20;  // a loop of frames has no end
-  for (const RecordedTransform& transform : transforms) {
-    if (transform.parent != parent || depth > kDeepest || --lines < 0) continue;
-    fmt::print("{:{}}{}{}\n", "", 2 * depth, transform.child, transform.moves ? " (moves)" : "");
-    printFrames(transforms, transform.child, depth + 1, lines);
+void printTransforms(const std::vector<RecordedTransform>& transforms) {
+  constexpr std::size_t kMost = 12;
+  for (std::size_t i = 0; i < std::min(transforms.size(), kMost); ++i) {
+    fmt::print("transform {}->{}{}: {} messages\n", transforms[i].parent, transforms[i].child,
+               transforms[i].moves ? ", moves" : "", transforms[i].count);
   }
-}
-
-/// Prints the tree of frames.
-void printFrames(const std::vector<RecordedTransform>& transforms) {
-  constexpr int kMostLines = 20;
-  int lines = kMostLines;
-  std::set<std::string> roots;
-  for (const RecordedTransform& transform : transforms) roots.insert(transform.parent);
-  for (const RecordedTransform& transform : transforms) roots.erase(transform.child);
-  for (const std::string& root : roots) {
-    fmt::print("frame {}\n", root);
-    printFrames(transforms, root, 1, lines);
-  }
-  if (lines < 0) fmt::print("  and {} more\n", -lines);
+  if (transforms.size() > kMost) fmt::print("  and {} more\n", transforms.size() - kMost);
 }
 
 void print(const RecordingInfo& info) {
@@ -135,7 +118,7 @@ void print(const RecordingInfo& info) {
                  formatSeconds(topic.until_ns));
     }
   }
-  printFrames(info.counts.transforms);
+  printTransforms(info.counts.transforms);
   for (const auto& [name, count] : info.others) fmt::print("{}: {} observations\n", name, count);
   if (info.counts.sorted_events > 0) {
     fmt::print("{} events out of order by up to 10 ms\n", info.counts.sorted_events);

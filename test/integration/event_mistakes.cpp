@@ -171,7 +171,8 @@ std::vector<Mistake> eventMistakes() {
         "warning: sorted-events: 1 events came later than newer ones and were sorted",
         "warning: silent-subintervals: 1 sub-intervals of a camera had no event",
         "error: data/cam0/events.txt:5: t = '1.577982000': expected events in time order, at most "
-        "10 ms before the newest (1.777647000) (--skip-bad-events"}},
+        "10 ms before the newest (1.777647000); this sorts them: sort -g -k1,1 -s FILE >NEW "
+        "(--skip-bad-events"}},
       {"events up to 10 ms late",
        [](Draft& draft) { std::swap(draft.events[0][1000].t_ns, draft.events[0][1500].t_ns); },
        {"warning: sorted-events: 500 events came later than newer ones and were sorted"}},

@@ -382,99 +382,91 @@ std::string readPaths(const RosTopic& topic, std::vector<StampedPose>& poses) {
 /// Poses of a bag, and their frames as the messages name them.
 struct FramedPoses {
   std::string name;  // of the topic
-  FrameMotion T_world_body;
-  MessageFrames frames;
+  FrameChain chain;  // from the world to the child frame
+  MessageFrames frames = {};
   bool is_transform = false;  // geometry_msgs/TransformStamped
 };
 
+/// @return the error of damage that ends the poses; empty if there is none.
 std::string readPoses(const RosTopic& topic, FramedPoses& poses) {
-  poses.name = topic.name;
-  poses.is_transform = topic.type == RosType::kTransform;
-  if (topic.type == RosType::kPath) {
-    poses.frames.frame = frameOf(topic);
-    return readPaths(topic, poses.T_world_body.moves);
-  }
-  bool first = true;
+  std::vector<StampedPose>& all = poses.chain.emplace_back();
+  if (topic.type == RosType::kPath) return readPaths(topic, all);
   return forMessages(topic, [&](const BagMessage& message) {
     const MessageFrames frames = framesOf(message, topic.type);
-    if (std::exchange(first, false)) poses.frames = frames;
+    if (all.empty()) poses.frames = frames;
     if (frames != poses.frames) {
       throw std::runtime_error(fmt::format(
           "poses of {} in {} beside poses of {} in {}: expected one body in one world frame",
           inQuotes(frames.child), inQuotes(frames.frame), inQuotes(poses.frames.child),
           inQuotes(poses.frames.frame)));
     }
-    for (const StampedPose& pose : decodePoses(message, topic.type)) {
-      poses.T_world_body.moves.push_back(pose);
-    }
+    all.push_back(decodePoses(message, topic.type).front());
     return true;
   });
 }
 
-/// Joins the poses' frame to the frame of camera 0's events, as far as the transforms tell.
-void joinFrames(const FrameTree& tree, const std::string& camera, FramedPoses poses,
-                std::vector<FrameMotion> chain, const ReaderOptions& options,
-                RecordingParts& parts) {
+/// Takes the poses. Joins their frame to the frame of camera 0's events, as far as the transforms
+/// tell.
+void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses poses,
+                const ReaderOptions& options, RecordingParts& parts) {
   const std::string& body = poses.frames.child;
   const bool differ = !camera.empty() && !body.empty() && body != camera;
+  const auto say = [&](std::vector<Warning>& to, const std::string& text) {
+    to.push_back({"pose-frame", text});
+  };
   FrameTree::Way way;
-  if (differ && options.has_hand_eye) {
+  if (differ && poses.is_transform && poses.frames.frame == camera && !options.has_hand_eye) {
+    // The camera sees a body that rests: the inverse is the camera's pose.
+    for (StampedPose& pose : poses.chain[0]) pose.T_world_rig = pose.T_world_rig.inverse();
+  } else if (differ) {
     try {
       way = tree.way(body, camera);
-    } catch (const std::runtime_error&) {  // several ways: the hand-eye transform is the choice
+    } catch (const std::runtime_error&) {
+      if (!options.has_hand_eye) throw;  // it replaces all ways
     }
-    if (!way.empty()) {
-      parts.notes.push_back(
-          {"pose-frame",
-           fmt::format("--hand-eye replaces the transform {}->{} of the bag", body, camera)});
+    if (options.has_hand_eye && !way.empty()) {
+      say(parts.notes,
+          fmt::format("--hand-eye replaces the transform {}->{} of the bag", body, camera));
       way.clear();
-    }
-  } else if (differ && poses.is_transform && poses.frames.frame == camera) {
-    // The camera sees a body that rests: the inverse is the camera's pose.
-    for (StampedPose& pose : chain.front().moves) pose.T_world_rig = pose.T_world_rig.inverse();
-  } else if (differ) {
-    way = tree.way(body, camera);
-    if (way.empty()) {
-      parts.warnings.push_back(
-          {"pose-frame",
-           fmt::format(
-               "{}: the poses are those of the frame {}, the events are in the frame {}, and no "
-               "transform joins them: if the two differ, give --hand-eye FILE (T_body_rig, the "
-               "pose of {} in {}), or record /tf_static, too",
-               poses.name, body, camera, camera, body)});
+    } else if (!options.has_hand_eye && way.empty()) {
+      say(parts.warnings,
+          fmt::format(
+              "{}: the poses are those of the frame {}, the events are in the frame {}, and "
+              "no transform joins them: if the two differ, give --hand-eye FILE "
+              "(T_body_rig, the pose of {} in {}), or record /tf_static, too",
+              poses.name, body, camera, camera, body));
     }
   }
-  for (FrameMotion& motion : tree.along(way)) chain.push_back(std::move(motion));
+  for (auto& transform : tree.along(way)) poses.chain.push_back(std::move(transform));
   if (!way.empty() && parts.poses_damage.empty()) parts.poses_damage = tree.damage();
   std::uint64_t left_out;
-  parts.poses = productOf(std::move(chain), left_out);
-  if (left_out > 0) {
-    parts.notes.push_back(
-        {"pose-frame", fmt::format("{}: {} poses are left out, as a transform begins later, ends "
-                                   "earlier or has a gap there",
-                                   poses.name, left_out)});
-  }
+  parts.poses = productOf(poses.chain, left_out);
+  if (left_out == 0) return;
+  say(parts.notes,
+      fmt::format("{}: {} poses are left out, as a transform begins later, ends earlier "
+                  "or has a gap there",
+                  poses.name, left_out));
 }
 
 /// Reads the poses of "/tf:world->body". @param option value of `--topics`.
 void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const std::string& option,
                       const ReaderOptions& options, RecordingParts& parts) {
   try {
+    const std::string topic = topicIn(option);
     const FrameTree::Way way =
-        tree.wayThrough(option.substr(std::min(topicIn(option).size() + 1, option.size())));
+        tree.wayThrough(option.substr(std::min(topic.size() + 1, option.size())));
     if (way.front() == camera) {
       throw std::runtime_error(fmt::format(
           "poses of {} in the camera's frame: expected the camera's poses, --topics \"{}:{}\"",
-          way.back(), topicIn(option), fmt::join(way.rbegin(), way.rend(), "->")));
+          way.back(), topic, fmt::join(way.rbegin(), way.rend(), "->")));
     }
-    std::vector<FrameMotion> chain = tree.along(way);
+    FramedPoses poses = {option, tree.along(way), {way.front(), way.back()}};
     parts.poses_damage = tree.damage();
-    if (std::all_of(chain.begin(), chain.end(),
-                    [](const FrameMotion& motion) { return motion.moves.empty(); })) {
+    if (std::all_of(poses.chain.begin(), poses.chain.end(),
+                    [](const auto& transform) { return transform.size() == 1; })) {
       throw std::runtime_error("constant: expected frames that move against each other");
     }
-    const FramedPoses poses = {option, {}, {way.front(), way.back()}};
-    joinFrames(tree, camera, poses, std::move(chain), options, parts);
+    takeJoined(tree, camera, std::move(poses), options, parts);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("--topics {}: {}", option, error.what()));
   }
@@ -528,19 +520,17 @@ void addPoses(const RosTopics& topics, RosTopics candidates, const RosTopics& ca
                            topic->name, all)});
     if (topic == nullptr) return;
   }
-  FramedPoses poses;
+  FramedPoses poses = {topic->name, {}};
+  poses.is_transform = topic->type == RosType::kTransform;
   const std::string damage = readPoses(*topic, poses);
   parts.poses_damage = damage;
-  std::vector<FrameMotion> chain = {std::move(poses.T_world_body)};
-  if (!chain.front().moves.empty()) {
-    try {
-      joinFrames(tree, camera, poses, std::move(chain), options, parts);
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(
-          fmt::format("{}: from the poses' frame to the camera's: {} (or "
-                      "--hand-eye FILE)",
-                      topic->name, error.what()));
-    }
+  try {
+    if (!poses.chain[0].empty()) takeJoined(tree, camera, std::move(poses), options, parts);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(
+        fmt::format("{}: from the poses' frame to the camera's: {} (or "
+                    "--hand-eye FILE)",
+                    topic->name, error.what()));
   }
   if (!damage.empty()) parts.expected_poses += beforeThe(damage);
 }
@@ -553,13 +543,12 @@ void addCameraFrames(const RosTopics& cameras, const FrameTree& tree, RecordingP
     const std::string& first = parts.camera_frames.front().name;
     if (frame.name.empty() || frame.name == first) continue;
     try {
-      const FrameTree::Way way = tree.way(first, frame.name);
-      std::vector<FrameMotion> chain = tree.along(way);
+      const FrameChain chain = tree.along(tree.way(first, frame.name));
       Rigid3 T_cam0_cam;
       bool constant = !chain.empty();
-      for (const FrameMotion& motion : chain) {
-        constant = constant && motion.moves.empty();
-        T_cam0_cam = T_cam0_cam * motion.T_a_b;
+      for (const auto& transform : chain) {
+        constant = constant && transform.size() == 1;
+        if (constant) T_cam0_cam = T_cam0_cam * transform[0].T_world_rig;
       }
       if (constant) frame.T_cam0_cam = T_cam0_cam;
     } catch (const std::runtime_error& error) {
@@ -642,7 +631,8 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
   addCameraFrames(cameras, tree, parts);
   if (options.lists_topics) {
     std::transform(topics.begin(), topics.end(), std::back_inserter(parts.topics), recorded);
-    parts.transforms = tree.transforms();
+    parts.transforms =
+        tree.transforms(cameras.empty() ? options.camera_frame : parts.camera_frames[0].name);
   }
   if (!options.leaves_out_poses) addPoses(topics, with_poses, cameras, tree, options, parts);
   addCalibration(topics, cameras, parts);

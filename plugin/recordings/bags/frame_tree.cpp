@@ -15,8 +15,6 @@ namespace {
 
 constexpr const char* kArrow = "->";
 
-std::string asText(const FrameTree::Way& way) { return fmt::format("{}", fmt::join(way, kArrow)); }
-
 /// @throws std::runtime_error naming the frames and the time of wrong numbers.
 Rigid3 rigidAt(const FrameTransform& transform) {
   try {
@@ -38,65 +36,34 @@ bool areApart(const PoseNumbers& a, const PoseNumbers& b) {
          std::abs(first.tail<4>().dot(second.tail<4>())) < kSameCosine;
 }
 
-/// Interpolates one transform of a chain at increasing times.
-class MotionAt {
- public:
-  /// @param motion moves.
-  explicit MotionAt(FrameMotion& motion) : poses_(motion.moves) {
-    constexpr std::int64_t kUsualGapNs = 250'000'000;
-    std::stable_sort(poses_.begin(), poses_.end(), isEarlier);
-    std::vector<std::int64_t> steps_ns;
-    for (std::size_t i = 1; i < poses_.size(); ++i) {
-      steps_ns.push_back(poses_[i].t_ns - poses_[i - 1].t_ns);
-    }
-    if (steps_ns.empty()) return;
-    const auto middle = steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
-    std::nth_element(steps_ns.begin(), middle, steps_ns.end());
-    max_gap_ns_ = std::max(kUsualGapNs, 3 * *middle);  // a slow transform has long steps
-  }
-  std::optional<Rigid3> at(std::int64_t t_ns) {
-    while (next_ < poses_.size() && poses_[next_].t_ns < t_ns) ++next_;
-    if (next_ == poses_.size()) return std::nullopt;
-    const StampedPose& after = poses_[next_];
-    if (after.t_ns == t_ns) return after.T_world_rig;
-    if (next_ == 0 || after.t_ns - poses_[next_ - 1].t_ns > max_gap_ns_) return std::nullopt;
-    return TrajectorySegment{poses_[next_ - 1], after}.poseAt(t_ns);
-  }
-  static bool isEarlier(const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; }
-
- private:
-  std::vector<StampedPose>& poses_;
-  std::int64_t max_gap_ns_ = 0;
-  std::size_t next_ = 0;
-};
-
 }  // namespace
 
-std::vector<StampedPose> productOf(std::vector<FrameMotion> chain, std::uint64_t& left_out) {
-  const auto most = std::max_element(chain.begin(), chain.end(), [](const auto& a, const auto& b) {
-    return a.moves.size() < b.moves.size();
-  });
-  std::vector<StampedPose> poses = most->moves;
-  std::map<const FrameMotion*, MotionAt> others;
-  for (FrameMotion& motion : chain) {
-    if (&motion != &*most && !motion.moves.empty()) others.emplace(&motion, motion);
+std::vector<StampedPose> productOf(const FrameChain& chain, std::uint64_t& left_out) {
+  constexpr double kUsualGapS = 0.25;
+  const auto most = std::max_element(
+      chain.begin(), chain.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  std::vector<Trajectory> trajectories;
+  for (const std::vector<StampedPose>& poses : chain) {
+    const auto [first, last] = std::minmax_element(
+        poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+    const double step_s =
+        secondsBetween(first->t_ns, last->t_ns) / static_cast<double>(poses.size());
+    trajectories.emplace_back(TrajectoryOptions{std::max(kUsualGapS, 3 * step_s)});  // or slow ones
+    if (poses.size() == 1 || &poses == &*most) continue;
+    for (const StampedPose& pose : poses) trajectories.back().add(pose);
   }
-  if (!others.empty()) std::stable_sort(poses.begin(), poses.end(), MotionAt::isEarlier);
   std::vector<StampedPose> product;
-  for (const StampedPose& pose : poses) {
+  for (const StampedPose& pose : *most) {
     std::optional<Rigid3> T_a_z = Rigid3();
-    for (const FrameMotion& motion : chain) {
-      std::optional<Rigid3> T_a_b = motion.T_a_b;
-      if (&motion == &*most) {
-        T_a_b = pose.T_world_rig;
-      } else if (!motion.moves.empty()) {
-        T_a_b = others.at(&motion).at(pose.t_ns);
-      }
-      T_a_z = T_a_z && T_a_b ? std::optional(*T_a_z * *T_a_b) : std::nullopt;
+    for (std::size_t i = 0; i < chain.size() && T_a_z; ++i) {
+      const bool given = chain[i].size() == 1 || &chain[i] == &*most;
+      const auto T_y_z = given ? (chain[i].size() == 1 ? chain[i][0] : pose).T_world_rig
+                               : trajectories[i].poseAt(pose.t_ns);
+      T_a_z = T_y_z ? std::optional(*T_a_z * *T_y_z) : std::nullopt;
     }
     if (T_a_z) product.push_back({pose.t_ns, *T_a_z});
   }
-  left_out = poses.size() - product.size();
+  left_out = most->size() - product.size();
   return product;
 }
 
@@ -119,34 +86,21 @@ FrameTree::FrameTree(Read read) : read_(std::move(read)) {
   }
 }
 
-std::vector<RecordedTransform> FrameTree::transforms() const {
+std::vector<RecordedTransform> FrameTree::transforms(const std::string& camera) const {
   std::vector<RecordedTransform> all;
   for (const auto& [pair, transform] : transforms_) {
     all.push_back({pair.first, pair.second, transform.moves, transform.count});
   }
+  const auto chain = above(camera);  // its frames are those nearest to the camera first
+  const auto rankOf = [&](const RecordedTransform& transform) {
+    const auto found = std::find_if(chain.begin(), chain.end(), [&](const auto& frame) {
+      return frame.first == transform.child;
+    });
+    return std::pair(found == chain.end(), chain.end() - found);
+  };
+  std::stable_sort(all.begin(), all.end(),
+                   [&](const auto& a, const auto& b) { return rankOf(a) < rankOf(b); });
   return all;
-}
-
-std::string FrameTree::names() const {
-  constexpr std::size_t kMost = 20;
-  std::string names;
-  std::size_t count = 0;
-  for (const auto& [pair, transform] : transforms_) {
-    if (++count > kMost) continue;
-    names += fmt::format("{}{}->{}{}", names.empty() ? "" : ", ", pair.first, pair.second,
-                         transform.moves ? "" : " (constant)");
-  }
-  if (count > kMost) names += fmt::format(" and {} more", count - kMost);
-  return names.empty() ? "none" : names;
-}
-
-std::vector<std::string> FrameTree::neighbours(const std::string& frame) const {
-  std::set<std::string> all;
-  for (const auto& [pair, transform] : transforms_) {
-    if (pair.first == frame) all.insert(pair.second);
-    if (pair.second == frame) all.insert(pair.first);
-  }
-  return {all.begin(), all.end()};
 }
 
 /// Finds the ways from the end of a way. A frame has usually one parent, so there are few.
@@ -156,8 +110,11 @@ void FrameTree::extend(Way& way, const std::string& to, std::vector<Way>& found,
     found.push_back(way);
     return;
   }
-  for (const std::string& next : neighbours(way.back())) {
+  const std::string frame = way.back();
+  for (const auto& [pair, transform] : transforms_) {
     if (found.size() == kMostWays || --steps < 0) return;
+    const std::string& next = pair.first == frame ? pair.second : pair.first;
+    if (pair.first != frame && pair.second != frame) continue;
     if (std::find(way.begin(), way.end(), next) != way.end()) continue;
     way.push_back(next);
     extend(way, to, found, steps);
@@ -169,17 +126,17 @@ FrameTree::Way FrameTree::way(const std::string& from, const std::string& to) co
   if (transforms_.count({from, to}) + transforms_.count({to, from}) > 0) return {from, to};
   std::vector<Way> found;
   Way way = {from};
-  int steps = 10'000;
+  int steps = 100'000;
   extend(way, to, found, steps);
-  if (found.empty()) return {};
-  if (found.size() == 1) return found.front();
-  std::string ways;
-  for (const Way& each : found) ways += (ways.empty() ? "" : ", ") + asText(each);
-  throw std::runtime_error(
-      fmt::format("several ways from {} to {}: expected one of {}", from, to, ways));
+  if (found.size() < 2) return found.empty() ? Way() : found.front();
+  std::vector<std::string> ways;
+  for (const Way& each : found) ways.push_back(fmt::format("{}", fmt::join(each, kArrow)));
+  throw std::runtime_error(fmt::format("several ways from {} to {}: expected one of {}", from, to,
+                                       fmt::join(ways, ", ")));
 }
 
 FrameTree::Way FrameTree::wayThrough(const std::string& frames) const {
+  constexpr std::size_t kMostNames = 20;
   Way all;
   for (std::size_t begin = 0; begin <= frames.size();) {
     const std::size_t end = std::min(frames.find(kArrow, begin), frames.size());
@@ -191,19 +148,24 @@ FrameTree::Way FrameTree::wayThrough(const std::string& frames) const {
     all.insert(all.end(), next.begin() + (all.empty() ? 0 : 1), next.end());
     if (begin > frames.size() && all.size() > 1) return all;
   }
-  throw std::runtime_error(fmt::format(
-      "no transforms between the frames '{}': expected PARENT->CHILD, of {}", frames, names()));
+  std::vector<std::string> names;
+  for (const auto& [pair, transform] : transforms_) {
+    names.push_back(pair.first + kArrow + pair.second + (transform.moves ? "" : " (constant)"));
+  }
+  if (names.size() > kMostNames) names.resize(kMostNames, "…");
+  throw std::runtime_error(
+      fmt::format("no transforms between the frames '{}': expected PARENT->CHILD, of {}", frames,
+                  fmt::join(names, ", ")));
 }
 
-std::vector<FrameMotion> FrameTree::along(const Way& way) const {
+FrameChain FrameTree::along(const Way& way) const {
   std::map<Pair, std::vector<StampedPose>> moving;
-  const auto pairAt = [&](std::size_t i) {
-    const Pair forward = {way[i], way[i + 1]};
-    return transforms_.count(forward) > 0 ? forward : Pair(way[i + 1], way[i]);
-  };
+  std::vector<Pair> pairs;
   for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-    const Transform& transform = transforms_.at(pairAt(i));
-    if (transform.moves) moving[pairAt(i)];
+    const bool forward = transforms_.count({way[i], way[i + 1]}) > 0;
+    pairs.push_back(forward ? Pair(way[i], way[i + 1]) : Pair(way[i + 1], way[i]));
+    const Transform& transform = transforms_.at(pairs.back());
+    if (transform.moves) moving[pairs.back()];
     if (!transform.other) continue;
     throw std::runtime_error(fmt::format(
         "{}->{} is constant, but has another value at {}: expected one publisher "
@@ -218,62 +180,60 @@ std::vector<FrameMotion> FrameTree::along(const Way& way) const {
   for (const auto& [pair, poses] : moving) {
     requireOneTrajectory(poses, fmt::format("the transform {}->{}", pair.first, pair.second));
   }
-  std::vector<FrameMotion> motions;
-  for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-    const Pair pair = pairAt(i);
-    FrameMotion motion;
-    if (transforms_.at(pair).moves) {
-      motion.moves = moving.at(pair);
+  FrameChain chain;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto found = moving.find(pairs[i]);
+    if (found != moving.end()) {
+      chain.push_back(found->second);
     } else {
-      motion.T_a_b = rigidAt(transforms_.at(pair).first);
+      chain.push_back({{0, rigidAt(transforms_.at(pairs[i]).first)}});
     }
-    if (pair.first != way[i]) {
-      motion.T_a_b = motion.T_a_b.inverse();
-      for (StampedPose& pose : motion.moves) pose.T_world_rig = pose.T_world_rig.inverse();
-    }
-    motions.push_back(std::move(motion));
+    if (pairs[i].first == way[i]) continue;
+    for (StampedPose& pose : chain.back()) pose.T_world_rig = pose.T_world_rig.inverse();
   }
-  return motions;
+  return chain;
 }
 
-/// Returns the frames above a frame that move against the frame below them. Constant transforms
-/// may be published in both directions.
-std::vector<std::string> FrameTree::above(const std::string& frame) const {
-  std::vector<std::string> found;
-  std::vector<std::string> all = {frame};
+/// Returns a frame and the frames above it, the nearest first, and whether each moves against the
+/// frame below it. Constant transforms may be published in both directions.
+std::vector<std::pair<std::string, bool>> FrameTree::above(const std::string& frame) const {
+  std::vector<std::pair<std::string, bool>> all = {{frame, false}};
   const auto visit = [&](const std::string& next, bool moves) {
-    if (std::count(all.begin(), all.end(), next) > 0) return;
-    all.push_back(next);
-    if (moves) found.push_back(next);
+    const auto same = [&](const auto& other) { return other.first == next; };
+    if (std::none_of(all.begin(), all.end(), same)) all.emplace_back(next, moves);
   };
   for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string below = all[i].first;
     for (const auto& [pair, transform] : transforms_) {
-      if (pair.second == all[i]) visit(pair.first, transform.moves);
-      if (pair.first == all[i] && !transform.moves) visit(pair.second, false);
+      if (pair.second == below) visit(pair.first, transform.moves);
+      if (pair.first == below && !transform.moves) visit(pair.second, false);
     }
   }
-  return found;
+  return all;
 }
 
 std::vector<std::string> FrameTree::choices(const std::string& camera) const {
   constexpr std::size_t kMost = 8;
-  std::vector<std::string> choices;
-  const auto add = [&](const std::string& world, const std::string& frame) {
-    const std::string choice = world + kArrow + frame;
-    if (choices.size() < kMost && std::count(choices.begin(), choices.end(), choice) == 0) {
-      choices.push_back(choice);
-    }
-  };
-  const bool knows_camera = !neighbours(camera).empty();
-  for (const std::string& world : above(camera)) add(world, camera);
+  std::set<std::string> parents, bodies;
   for (const auto& [pair, transform] : transforms_) {
-    if (knows_camera && choices.empty() && transform.moves) add(pair.second, camera);  // above all
-    const bool has_child = std::any_of(
-        transforms_.begin(), transforms_.end(),
-        [&, child = pair.second](const auto& other) { return other.first.first == child; });
-    if (knows_camera || has_child) continue;
-    for (const std::string& world : above(pair.second)) add(world, pair.second);
+    parents.insert(pair.first);
+    bodies.insert(pair.second);
   }
+  const bool has_camera = parents.count(camera) + bodies.count(camera) > 0;
+  for (const std::string& parent : parents) bodies.erase(parent);
+  if (has_camera) bodies = {camera};
+  std::vector<std::string> choices;
+  for (const std::string& body : bodies) {
+    for (const auto& [world, moves] : above(body)) {
+      if (moves) choices.push_back(world + kArrow + body);
+    }
+  }
+  for (const auto& [pair, transform] : transforms_) {  // a camera that is above all others
+    if (has_camera && choices.empty() && transform.moves) {
+      choices.push_back(pair.second + kArrow + camera);
+    }
+  }
+  if (choices.size() > kMost) choices.resize(kMost);
   return choices;
 }
 

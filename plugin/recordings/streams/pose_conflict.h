@@ -7,32 +7,21 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/trajectory.h"
 #include "mapping/geometry/trajectory_check.h"
 
 namespace efm {
 
 /// Why the poses of a file or topic are not one trajectory on one clock.
-struct PoseConflict {
-  enum class Kind {
-    kOneTime,     ///< All poses have the same time.
-    kEqualTimes,  ///< Poses of one time differ.
-    kTwoPlaces,   ///< Poses alternate between two places.
-    kBackward,    ///< Times go back, and the poses there differ from the earlier ones.
-  };
-  Kind kind = Kind::kOneTime;
-  std::size_t first = 0, second = 0;  ///< The first two poses that contradict each other.
-  std::size_t back = 0;               ///< kBackward: the first pose after the times went back.
-  double distance_m = 0, angle_rad = 0;
+struct PoseConflict : TrajectoryConflict {  // `first` and `second`: in the order of the file
+  /// The first pose after the times went back, if the poses differ from earlier ones of the time
+  /// that they have again.
+  std::optional<std::size_t> back;
 
   /// Returns the error. @param placeOf returns the place of a pose, by its index: "line 12".
   std::string text(const std::function<std::string(std::size_t)>& placeOf) const;
-
-  std::string counts = {};  ///< "480 of 500"
 };
 
-/// Finds a conflict as `TrajectoryCheck` does, and in the time that poses of a file have again
-/// after their times went back.
+/// Finds a conflict as `TrajectoryCheck` does, over all poses and where the times go back.
 /// @param poses in the order of the file.
 std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& poses);
 

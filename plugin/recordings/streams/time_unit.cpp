@@ -169,8 +169,9 @@ void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
                     where, sample.count, sample.latest));
   }
   const bool consecutive = sample.latest - sample.earliest == sample.count - 1;
-  if (!sample.rising || sample.has_parts || sample.earliest < 0 || sample.latest >= kMostFrames ||
-      (sample.whole && !(consecutive && sample.earliest <= 1))) {
+  const bool from_start = sample.earliest == 0 || sample.earliest == 1;
+  if (!sample.rising || sample.has_parts || !from_start || sample.latest >= kMostFrames ||
+      (sample.whole && !consecutive)) {
     return;
   }
   throw std::runtime_error(fmt::format(

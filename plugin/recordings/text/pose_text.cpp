@@ -235,41 +235,37 @@ PoseText parsePoses(std::string_view text, const std::filesystem::path& file,
 
 /// Returns a command that takes one trajectory out of a text, for an error.
 std::string remedyFor(const PoseConflict& conflict, const PoseText& text) {
-  const std::vector<PoseLine>& lines = text.lines;
   const auto column = [&](std::size_t field) { return text.columns.column[field] + 1; };
-  const auto is_short = [&](std::size_t i) {
-    const std::string_view t = poseFields(lines[i].text)[text.columns.column[0]];
-    const std::string_view digits = t.substr(0, t.find_first_of("eE"));
-    return std::count_if(digits.begin(), digits.end(), [](char c) { return c != '.'; }) <= 6;
-  };
-  if (conflict.kind == PoseConflict::Kind::kEqualTimes && is_short(conflict.first) &&
-      std::abs(text.poses[conflict.first].t_ns) > 100 * kNanosecondsPerSecond) {
+  const PoseLine& line = text.lines[conflict.first];
+  const std::string_view t = poseFields(line.text)[text.columns.column[0]];
+  const std::string_view digits = t.substr(0, t.find_first_of("eE"));
+  const auto count = std::count_if(digits.begin(), digits.end(), [](char c) { return c != '.'; });
+  const bool is_late = std::abs(text.poses[conflict.first].t_ns) > 100 * kNanosecondsPerSecond;
+  if (conflict.equal_times && !conflict.back && count <= 6 && is_late) {
     return "the times have six digits: write them with all, for example by numpy.savetxt(FILE, "
            "poses, fmt='%.9f')";
   }
-  const std::string awk = awkFor(lines.front().text);
-  const std::size_t first = lines.front().number;
-  std::string command;
-  if (conflict.kind == PoseConflict::Kind::kBackward) {
-    command = fmt::format("head -n {} FILE >NEW", lines[conflict.back].number - 1);
-  } else if (conflict.kind == PoseConflict::Kind::kEqualTimes) {
-    command = fmt::format("{} '!seen[${}]++' FILE >NEW", awk, column(0));
-  } else if (conflict.distance_m > conflict.angle_rad) {
+  std::string command = fmt::format("head -n {}", text.lines[conflict.back.value_or(0)].number - 1);
+  const std::string awk = awkFor(line.text);
+  const std::size_t first = text.lines.front().number;
+  if (conflict.equal_times && !conflict.back) {
+    command = fmt::format("{} '!seen[${}]++'", awk, column(0));
+  } else if (!conflict.back && conflict.distance_m > conflict.angle_rad) {
     const double half = conflict.distance_m / 2 / text.columns.metres[0];
     command = fmt::format(
-        "{} 'NR <= {} || (${}-x)^2 + (${}-y)^2 + (${}-z)^2 < {:.3g} {{print; x=${}; y=${}; "
-        "z=${}}}' "
-        "FILE >NEW",
-        awk, first, column(1), column(2), column(3), half * half, column(1), column(2), column(3));
-  } else {
-    const double cosine = std::cos(conflict.angle_rad / 4);  // of half the angle in the middle
+        "{} 'NR <= {} || (${x}-x)^2 + (${y}-y)^2 + (${z}-z)^2 < {:.3g} {{print; x=${x}; y=${y}; "
+        "z=${z}}}'",
+        awk, first, half * half, fmt::arg("x", column(1)), fmt::arg("y", column(2)),
+        fmt::arg("z", column(3)));
+  } else if (!conflict.back) {
+    const double cosine = std::cos(conflict.angle_rad / 4);  // of half of the middle angle
     command = fmt::format(
-        "{} 'NR <= {} || (${}*a + ${}*b + ${}*c + ${}*d)^2 > {:.6f} {{print; a=${}; b=${}; c=${}; "
-        "d=${}}}' FILE >NEW",
-        awk, first, column(4), column(5), column(6), column(7), cosine * cosine, column(4),
-        column(5), column(6), column(7));
+        "{} 'NR <= {} || (${a}*a + ${b}*b + ${c}*c + ${d}*d)^2 > {:.6f} {{print; a=${a}; b=${b}; "
+        "c=${c}; d=${d}}}'",
+        awk, first, cosine * cosine, fmt::arg("a", column(4)), fmt::arg("b", column(5)),
+        fmt::arg("c", column(6)), fmt::arg("d", column(7)));
   }
-  return "the poses of the first one: " + command;
+  return "the poses of the first one: " + command + " FILE >NEW";
 }
 
 }  // namespace

@@ -559,7 +559,7 @@ TEST_F(BagRecording, TransformsThatContradictEachOtherAreErrors) {
     twice.transform("/tf", t_ns, "odom", "base", {{1, 0, 0, 0}, {0, 3, 0}});
   }
   EXPECT_THAT(errorOfBag(twice, {"/tf:map->cam"}),
-              HasSubstr("the transform odom->base: the poses of two bodies"));
+              HasSubstr("the transform odom->base: poses of two bodies"));
   RobotBag ways = robot;
   for (int i = 0; i < RobotBag::kPoses; ++i) {
     ways.transform("/tf", RobotBag::odomNs(i), "gps", "base",
