@@ -394,11 +394,9 @@ std::string readPoses(const RosTopic& topic, FramedPoses& poses) {
   return forMessages(topic, [&](const BagMessage& message) {
     const MessageFrames frames = framesOf(message, topic.type);
     if (all.empty()) poses.frames = frames;
-    if (frames != poses.frames) {
-      throw std::runtime_error(fmt::format(
-          "poses of {} in {} beside poses of {} in {}: expected one body in one world frame",
-          inQuotes(frames.child), inQuotes(frames.frame), inQuotes(poses.frames.child),
-          inQuotes(poses.frames.frame)));
+    if (frames.child != poses.frames.child) {
+      throw std::runtime_error(fmt::format("a pose of {} beside poses of {}: expected one body",
+                                           inQuotes(frames.child), inQuotes(poses.frames.child)));
     }
     all.push_back(decodePoses(message, topic.type).front());
     return true;
@@ -468,7 +466,8 @@ void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const st
     }
     takeJoined(tree, camera, std::move(poses), options, parts);
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("--topics {}: {}", option, error.what()));
+    throw std::runtime_error(fmt::format("--topics {}: {}{}", option, error.what(),
+                                         tree.damage().empty() ? "" : beforeThe(tree.damage())));
   }
 }
 

@@ -77,12 +77,8 @@ void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>
 
 /// The frames that a message names, without a slash at their beginning; empty: none.
 struct MessageFrames {
-  std::string frame;  ///< Frame of the header.
+  std::string frame;  ///< Frame of the header. Some programs write a counter.
   std::string child;  ///< Frame whose pose a transform or odometry gives.
-
-  bool operator!=(const MessageFrames& other) const {
-    return frame != other.frame || child != other.child;
-  }
 };
 /// @param type any type whose messages begin with a header.
 MessageFrames framesOf(const BagMessage& message, RosType type);

@@ -7,8 +7,8 @@
 #include <array>
 #include <cassert>
 #include <limits>
+#include <map>
 #include <memory>
-#include <set>
 #include <stdexcept>
 
 #include "mapping/base/text.h"
@@ -116,20 +116,23 @@ std::string_view wholeLines(std::string_view text, bool ended) {
   return ended ? text : text.substr(0, text.rfind('\n') + 1);
 }
 
-/// Returns the different values of the camera's column, in natural order.
+/// Returns the different values of the camera's column, in natural order. A value that a thousandth
+/// of the lines do not have is a damaged one: its lines are bad.
 std::vector<std::string> camerasIn(const std::filesystem::path& file, const EventColumns& columns) {
   constexpr std::size_t kMost = 64;
+  constexpr std::size_t kMaxValues = 1000;
   const auto naturally = [](const std::string& a, const std::string& b) {
     return std::make_pair(a.size(), a) < std::make_pair(b.size(), b);  // 2 before 10
   };
-  std::set<std::string, decltype(naturally)> cameras(naturally);
+  std::map<std::string, std::uint64_t, decltype(naturally)> counts(naturally);
   const std::size_t column = columns.order.find('c');
   FileContent content(file);
   std::vector<char> block(kBlockBytes);
-  std::string_view last;
+  auto last = counts.end();
+  std::uint64_t most = 0;
   std::size_t carried = 0;
   std::uint64_t line_number = 0;
-  for (bool ended = false; !ended && cameras.size() <= kMost;) {
+  for (bool ended = false; !ended && counts.size() <= kMaxValues;) {
     const std::size_t wanted = block.size() - carried;
     const std::size_t count = content.read(block.data() + carried, wanted);
     ended = count < wanted;
@@ -141,25 +144,35 @@ std::vector<std::string> camerasIn(const std::filesystem::path& file, const Even
       const std::string_view line = trimmed(takeLine(lines));
       if (++line_number <= columns.header_lines) continue;
       const auto fields = eventFields(line.substr(0, line.find('#')), columns.separator);
-      if (fields.size() != columns.order.size() || fields[column] == last) continue;
-      last = *cameras.emplace(fields[column]).first;
+      if (fields.size() != columns.order.size()) continue;
+      if (last == counts.end() || fields[column] != last->first) {
+        last = counts.try_emplace(std::string(fields[column])).first;
+      }
+      most = std::max(most, ++last->second);
     }
     std::copy(text.end() - static_cast<std::ptrdiff_t>(carried), text.end(), block.begin());
   }
-  if (cameras.size() > kMost) {
+  std::vector<std::string> cameras;
+  for (const auto& [camera, count] : counts) {
+    if (1000 * count >= most) cameras.push_back(camera);
+  }
+  if (cameras.size() > kMost || counts.size() > kMaxValues) {
     throw std::runtime_error(
         fmt::format("{}: column {}: over {} cameras: expected a column with the event's camera "
                     "(another column: --event-columns, - for one to ignore)",
                     file.string(), column + 1, kMost));
   }
-  return {cameras.begin(), cameras.end()};
+  return cameras;
 }
 
 }  // namespace
 
 EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions& options,
-                                 std::string camera)
-    : content_(std::move(file)), camera_(std::move(camera)), block_(kFirstBytes) {
+                                 std::vector<std::string> cameras, std::size_t camera)
+    : content_(std::move(file)),
+      cameras_(std::move(cameras)),
+      camera_(camera),
+      block_(kFirstBytes) {
   carried_ = content_.read(block_.data(), kFirstBytes);
   ended_ = carried_ < kFirstBytes;
   const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
@@ -255,7 +268,9 @@ const char* EventTextStream::parsePlainLine(const char* text, Event& event, bool
                                          : takeIgnored(text, columns_.separator);
       if (!taken) return nullptr;
       if (column != 'c') continue;
-      of_camera = isOfCamera({begin, static_cast<std::size_t>(text - begin)});
+      const std::string_view camera(begin, static_cast<std::size_t>(text - begin));
+      of_camera = isOfCamera(camera);
+      if (!of_camera && !isLeft(camera)) return nullptr;
     }
   }
   if (*text == '\r') ++text;
@@ -267,10 +282,14 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
   if (fields.empty()) return std::nullopt;
   const std::size_t camera = columns_.order.find('c');
-  if (camera < fields.size() && !isOfCamera(fields[camera])) return std::nullopt;
+  if (camera < fields.size() && !isOfCamera(fields[camera])) {
+    if (isLeft(fields[camera])) return std::nullopt;
+    throw std::runtime_error(fmt::format("{}: camera = {}: expected {}", place(line_),
+                                         inQuotes(fields[camera]), fmt::join(cameras_, " or ")));
+  }
   const auto names = [&] { return fmt::join(columns_.order, " "); };
   const std::size_t count = columns_.order.size();
-  if (fields.size() != count && ignores_bad_lines_) return std::nullopt;
+  if (fields.size() != count && camera_ > 0) return std::nullopt;
   if (fields.size() < count && unterminated) {
     throw std::runtime_error(fmt::format("{}: {}: expected {}, but the file ends within the line",
                                          place(line_), inQuotes(content), names()));
@@ -395,7 +414,8 @@ std::string EventTextStream::commandOfCamera() const {
       "\"{}\"'{} >NEW",
       name(), column, content_.seekableBytes() > 0 ? "" : "zcat FILE | ",
       columns_.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.separator),
-      columns_.header_lines, column, camera_, content_.seekableBytes() > 0 ? " FILE" : "");
+      columns_.header_lines, column, cameras_[camera_],
+      content_.seekableBytes() > 0 ? " FILE" : "");
 }
 
 std::string EventTextStream::place(std::uint64_t line) const {
@@ -428,8 +448,7 @@ std::vector<std::unique_ptr<EventTextStream>> openEventText(const std::filesyste
   const std::vector<std::string> cameras = camerasIn(file, columns);
   if (cameras.size() > 1) streams.clear();
   for (std::size_t i = 0; streams.size() < cameras.size(); ++i) {
-    streams.push_back(std::make_unique<EventTextStream>(file, options, cameras[i]));
-    if (i > 0) streams.back()->ignoreBadLines();
+    streams.push_back(std::make_unique<EventTextStream>(file, options, cameras, i));
   }
   return streams;
 }

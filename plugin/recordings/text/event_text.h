@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -23,9 +24,10 @@ namespace efm {
 /// are ignored.
 class EventTextStream : public EventStream {
  public:
-  /// @param camera takes only the lines with this text in the camera's column; empty: all lines.
+  /// @param cameras the texts in the camera's column; empty: takes the lines of all cameras.
+  /// @param camera takes the lines of this one of `cameras`. The first one has the bad lines, too.
   explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {},
-                           std::string camera = {});
+                           std::vector<std::string> cameras = {}, std::size_t camera = 0);
 
   bool read(std::vector<Event>& events) override;
   void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
@@ -38,13 +40,13 @@ class EventTextStream : public EventStream {
   std::optional<CameraSize> size() const override { return columns_.size; }
   std::vector<Warning> warnings() const override { return columns_.warnings; }
   void setSize(const CameraSize& size) { columns_.size = size; }
-  std::string label() const override { return camera_.empty() ? camera_ : "camera " + camera_; }
+  std::string label() const override {
+    return cameras_.empty() ? "" : "camera " + cameras_[camera_];
+  }
   std::string commandInOrder() const override;
   /// A command that takes the events of this stream's camera out of the file, for errors.
   std::string commandOfCamera() const;
   const EventColumns& columns() const { return columns_; }
-  /// Leaves lines with a wrong number of fields to the stream of another camera.
-  void ignoreBadLines() { ignores_bad_lines_ = true; }
 
  private:
   void takeLines(const char* begin, const char* end, std::vector<Event>& events);
@@ -54,11 +56,17 @@ class EventTextStream : public EventStream {
   std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
   std::string place(std::uint64_t line) const;
 
-  bool isOfCamera(std::string_view camera) const { return camera_.empty() || camera == camera_; }
+  bool isOfCamera(std::string_view camera) const {
+    return cameras_.empty() || camera == cameras_[camera_];
+  }
+  /// Returns whether a line of another camera is left to the stream of that camera.
+  bool isLeft(std::string_view camera) const {
+    return camera_ > 0 || std::find(cameras_.begin(), cameras_.end(), camera) != cameras_.end();
+  }
 
   FileContent content_;
-  std::string camera_;
-  bool ignores_bad_lines_ = false;
+  std::vector<std::string> cameras_;
+  std::size_t camera_ = 0;  // index in cameras_
   EventColumns columns_;
   BadEvents* bad_ = nullptr;
   bool usual_ = true;  // columns_.isUsual()

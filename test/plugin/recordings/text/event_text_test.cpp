@@ -166,6 +166,32 @@ TEST_F(EventText, AColumnWithTheCameraDividesAFile) {
     EXPECT_EQ(readPackets(packets).size(), 1U);
   }
   EXPECT_EQ(bad.count(), 2U);
+  // So is a line with a damaged name of the camera.
+  std::string damaged = "t,x,y,p,cam\n";
+  for (int i = 0; i < 4000; ++i) {
+    damaged += fmt::format("{},1,1,1,{}\n", 1 + 0.001 * i,
+                           i == 99    ? "x"
+                           : i == 100 ? "7"
+                           : i % 2    ? "1"
+                                      : "0");
+  }
+  writeFile(folder() / "a.csv", damaged);
+  ASSERT_EQ(openEventText(folder() / "a.csv", {}).size(), 2U);
+  EXPECT_THAT(
+      errorOf([&] {
+        EventPackets packets(std::move(openEventText(folder() / "a.csv", {})[0]), {240, 180});
+        BadEvents none(0);
+        packets.skipBadEvents(none);
+        readPackets(packets);
+      }),
+      HasSubstr("a.csv:101: camera = 'x': expected 0 or 1 (--skip-bad-events"));
+  BadEvents two(2);
+  for (auto& stream : openEventText(folder() / "a.csv", {})) {
+    EventPackets packets(std::move(stream), {240, 180});
+    packets.skipBadEvents(two);
+    EXPECT_EQ(readPackets(packets).size(), 1999U);
+  }
+  EXPECT_EQ(two.count(), 2U);
   ReaderOptions options;
   options.columns = "t x y p -";
   EXPECT_EQ(openEventText(folder() / "a.csv", options).size(), 1U) << "the user ignores it";
