@@ -9,6 +9,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -102,16 +103,23 @@ inline py::array imageOf(const cv::Mat1f& image) {
                      image);
 }
 
-inline py::array pointsOf(const MapCloud::ConstPtr& cloud) {
-  const py::dtype type(
-      py::cast(std::vector<std::string>{"x", "y", "z", "intensity", "support", "sigma"}),
-      py::cast(std::vector<std::string>{"f4", "f4", "f4", "f4", "u4", "f4"}),
-      py::cast(std::vector<std::size_t>{offsetof(MapPoint, x), offsetof(MapPoint, y),
-                                        offsetof(MapPoint, z), offsetof(MapPoint, intensity),
-                                        offsetof(MapPoint, support), offsetof(MapPoint, sigma)}),
-      sizeof(MapPoint));
-  return sharedArray(type, {static_cast<py::ssize_t>(cloud->size())}, {sizeof(MapPoint)},
-                     cloud->points.data(), cloud);
+/// A point of a map in the world. A cloud's own floats are relative to its origin.
+struct PointRecord {
+  double x, y, z;
+  float intensity;
+  std::uint32_t support;
+  float sigma;
+};
+
+inline py::array pointsOf(const MapCloud& cloud) {
+  py::array_t<PointRecord> records(static_cast<py::ssize_t>(cloud.size()));
+  PointRecord* next = records.mutable_data();
+  for (const MapPoint& point : cloud.points) {
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    *next++ = {p_world.x(), p_world.y(), p_world.z(), point.intensity, point.support, point.sigma};
+  }
+  records.attr("flags").attr("writeable") = false;
+  return records;
 }
 
 /// Poses as times (n,) in nanoseconds and matrices (n, 4, 4).
@@ -131,6 +139,7 @@ inline py::tuple posesOf(const std::vector<StampedPose>& poses) {
 inline std::vector<StampedPose> stampedPoses(const py::array_t<std::int64_t>& t_ns,
                                              const Array& T_world_rig) {
   const py::ssize_t count = t_ns.size();
+  if (count == 0) return {};
   if (t_ns.ndim() != 1 || T_world_rig.ndim() < 2 || T_world_rig.shape(0) != count) {
     throw std::invalid_argument(
         "poses: expected times of shape (n,), and matrices (n, 4, 4) or rows (n, 7)");
@@ -145,8 +154,34 @@ inline std::vector<StampedPose> stampedPoses(const py::array_t<std::int64_t>& t_
   return poses;
 }
 
-/// Lets Ctrl-C end a long call.
+/// Calls that run without the interpreter's lock. At its exit, Python kills threads that ask for
+/// the lock again, and C++ cannot bear that: the exit waits until there are no such calls.
+class ReleasedCalls {
+ public:
+  static std::atomic<int>& count() {
+    static std::atomic<int> calls = 0;
+    return calls;
+  }
+  static std::atomic<bool>& ending() {
+    static std::atomic<bool> exits = false;
+    return exits;
+  }
+
+  ReleasedCalls() { ++count(); }
+  ~ReleasedCalls() { --count(); }
+  ReleasedCalls(const ReleasedCalls&) = delete;
+  ReleasedCalls& operator=(const ReleasedCalls&) = delete;
+};
+
+/// Releases the interpreter's lock for a call. It is counted until it has the lock again.
+struct Released {
+  ReleasedCalls counted;
+  py::gil_scoped_release released;
+};
+
+/// Lets Ctrl-C and Python's exit end a long call.
 inline void checkSignals() {
+  if (ReleasedCalls::ending()) throw std::runtime_error("Python has ended");
   const py::gil_scoped_acquire held;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
@@ -167,6 +202,9 @@ inline void give(const Keyframe& keyframe, const OnKeyframe& on_keyframe) {
   const py::gil_scoped_acquire held;
   on_keyframe(std::make_shared<const Keyframe>(keyframe));
 }
+
+/// Returns a text of the engine with the arguments of Python in place of the program's options.
+std::string pythonText(const std::string& text);
 
 /// Defines the functions that map, evaluate and simulate.
 void defineJobs(py::module_& module);

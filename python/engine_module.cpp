@@ -4,20 +4,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <regex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "arrays.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/text/event_columns.h"
 
 namespace efm {
 namespace {
@@ -34,8 +40,12 @@ using EventArray = py::array_t<EventRecord, py::array::c_style>;
 std::vector<Event> eventsOf(const EventArray& records) {
   const EventRecord* first = records.data();
   std::vector<Event> events(static_cast<std::size_t>(records.size()));
-  const py::gil_scoped_release released;
+  const Released released;
   for (std::size_t i = 0; i < events.size(); ++i) {
+    if (first[i].p < -1 || first[i].p > 1) {
+      throw std::invalid_argument(
+          fmt::format("p[{}] = {}: expected {}", i, first[i].p, kExpectedPolarity));
+    }
     events[i] = {first[i].t, first[i].x, first[i].y, first[i].p > 0};
   }
   return events;
@@ -44,7 +54,7 @@ std::vector<Event> eventsOf(const EventArray& records) {
 EventArray recordsOf(const std::vector<Event>& events) {
   EventArray records(static_cast<py::ssize_t>(events.size()));
   EventRecord* next = records.mutable_data();
-  const py::gil_scoped_release released;
+  const Released released;
   for (const Event& event : events) {
     *next++ = {event.x, event.y, static_cast<std::int16_t>(event.polarity ? 1 : 0), event.t_ns};
   }
@@ -66,7 +76,8 @@ class EventReader {
   EventArray next(int camera, std::size_t count) {
     std::vector<Event> part;
     {
-      const py::gil_scoped_release released;
+      const Released released;
+      const std::lock_guard<std::mutex> lock(mutex_);
       while (!damage_ && waiting_.size() < count && readPacket(camera)) checkSignals();
       if (damage_ && waiting_.empty()) std::rethrow_exception(damage_);
       const auto end =
@@ -93,6 +104,7 @@ class EventReader {
     return true;
   }
 
+  std::mutex mutex_;  // several threads may take turns
   std::unique_ptr<Recording> recording_;
   std::vector<Event> waiting_;
   std::exception_ptr damage_;
@@ -119,16 +131,23 @@ std::vector<StampedPose> readPoses(const RecordingSource& source) {
   return poses;
 }
 
+/// Returns the result of a call without the interpreter's lock.
+template <typename Call>
+auto released(const Call& call) {
+  const Released guard;
+  return call();
+}
+
 void addPoses(Mapper& mapper, const py::array_t<std::int64_t>& t_ns, const Array& T_world_rig) {
   const std::vector<StampedPose> poses = stampedPoses(t_ns, T_world_rig);
-  const py::gil_scoped_release released;
+  const Released released;
   for (const StampedPose& pose : poses) mapper.addPose(pose);
 }
 
 /// A mapper's own thread may wait for the interpreter's lock, so its end must not hold it.
 struct DeleteReleased {
   void operator()(Mapper* mapper) const {
-    const py::gil_scoped_release released;
+    const Released released;
     delete mapper;
   }
 };
@@ -153,6 +172,37 @@ void addRecording(Mapper& mapper, const RecordingSource& source) {
   }
 }
 
+}  // namespace
+
+std::string pythonText(const std::string& text) {
+  static const std::pair<std::regex, const char*> kNames[] = {
+      {std::regex("--set ([a-z_]+\\.[a-z_]+)=([^\\s);,]+)"), "options={'$1': '$2'}"},
+      {std::regex("--sensor-size ([0-9]+)x([0-9]+)"), "sensor_size=($1, $2)"},
+      {std::regex("--(poses|calibration|topics|format)( (?=[A-Z0-9\"'/])|(?=[^a-z-]|$))"), "$1="},
+      {std::regex("--hand-eye ?"), "hand_eye="},
+      {std::regex("--pose-time-unit ?"), "pose_time_unit="},
+      {std::regex("--time-unit ?"), "time_unit="},
+      {std::regex("--event-columns ?"), "event_columns="},
+      {std::regex("--skip-bad-events ?"), "skip_bad_events="},
+      {std::regex("stopped by a signal"), "stopped"},
+  };
+  std::string named = text;
+  if (text.find("--") == std::string::npos && text.find("signal") == std::string::npos)
+    return named;
+  for (const auto& [option, argument] : kNames) named = std::regex_replace(named, option, argument);
+  return named;
+}
+
+namespace {
+
+/// Sets an error of Python. Names of files need not be UTF-8.
+void setError(PyObject* type, const char* what) {
+  const std::string text = pythonText(what);
+  const auto decoded = py::reinterpret_steal<py::object>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
+  if (decoded) PyErr_SetObject(type, decoded.ptr());
+}
+
 void translateErrors() {
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
@@ -162,7 +212,11 @@ void translateErrors() {
     } catch (const py::builtin_exception&) {
       throw;
     } catch (const std::runtime_error& error) {
-      PyErr_SetString(PyExc_OSError, error.what());
+      setError(PyExc_OSError, error.what());
+    } catch (const std::invalid_argument& error) {
+      setError(PyExc_ValueError, error.what());
+    } catch (const std::logic_error& error) {
+      setError(PyExc_RuntimeError, error.what());
     }
   });
 }
@@ -175,7 +229,7 @@ Parameters
 width, height : int
     Pixels of the sensor.
 K : array_like, shape (3, 3)
-    Camera matrix, pixels. Skew is ignored.
+    Camera matrix, pixels, without skew.
 distortion : str
     The lens, as Kalibr calls it: 'none', 'radtan' or 'equidistant'.
 coefficients : sequence of float
@@ -195,6 +249,10 @@ ValueError
                        std::vector<double> coefficients, const std::optional<Array>& T_rig_cam,
                        std::int64_t time_offset_ns) {
              const auto K = matrixOf<Matrix3>(K_array, "K");
+             if (!isCameraMatrix({K.data(), K.data() + K.size()})) {
+               throw std::invalid_argument(
+                   "K: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew");
+             }
              RigCamera camera{{width, height, K(0, 0), K(1, 1), K(0, 2), K(1, 2),
                                distortionModelFromName(distortion), std::move(coefficients)},
                               T_rig_cam ? rigidOf(*T_rig_cam, "T_rig_cam") : Rigid3{},
@@ -319,17 +377,17 @@ void defineRecordings(py::module_& module) {
         source.limits.validate();
       });
   py::class_<EventReader>(module, "EventReader")
-      .def(py::init<const RecordingSource&>(), py::call_guard<py::gil_scoped_release>())
+      .def(py::init<const RecordingSource&>(), py::call_guard<Released>())
       .def("next", &EventReader::next);
   module.def("read_rig", [](const RecordingSource& source) {
-    const py::gil_scoped_release released;
+    const Released released;
     return openToRead(source)->rig().cameras;
   });
-  module.def("first_event", &firstEvent, py::call_guard<py::gil_scoped_release>());
+  module.def("first_event", &firstEvent, py::call_guard<Released>());
   module.def("read_poses", [](const RecordingSource& source) {
     std::vector<StampedPose> poses;
     {
-      const py::gil_scoped_release released;
+      const Released released;
       poses = readPoses(source);
     }
     return posesOf(poses);
@@ -342,7 +400,7 @@ void defineMapper(py::module_& module) {
       .def("set", &Options::set)
       .def("read", &Options::read)
       .def("validate", [](const Options& options) { options.values(); });
-  const py::call_guard<py::gil_scoped_release> releases;
+  const py::call_guard<Released> releases;
   py::class_<Mapper, MapperPointer>(module, "Mapper")
       .def(py::init(&makeMapper), py::arg("options"), py::arg("on_keyframe"), py::arg("on_warning"))
       .def("add_camera", &Mapper::addCamera, releases)
@@ -350,7 +408,7 @@ void defineMapper(py::module_& module) {
           "add_events",
           [](Mapper& mapper, int camera, const EventArray& records) {
             std::vector<Event> events = eventsOf(records);
-            const py::gil_scoped_release released;
+            const Released released;
             mapper.addEvents(camera, std::move(events));
           },
           py::arg("camera"), py::arg("records").noconvert())  // it would convert by position
@@ -364,27 +422,39 @@ void defineMapper(py::module_& module) {
             savePoints(*mapper.points(), file);
           },
           releases)
-      .def("status",
+      .def(
+          "status",
+          [](const Mapper& mapper) {
+            const SessionStatus status = mapper.status();
+            return std::pair(status.counts.keyframes, status.live ? status.live->dropRatio() : 0);
+          },
+          releases)
+      .def(
+          "points",
+          [](const Mapper& mapper) { return pointsOf(*released([&] { return mapper.points(); })); })
+      .def("trajectory",
            [](const Mapper& mapper) {
-             const SessionStatus status = mapper.status();
-             return std::pair(status.counts.keyframes, status.live ? status.live->dropRatio() : 0);
+             return posesOf(released([&] { return mapper.trajectory(); }));
            })
-      .def("points", [](const Mapper& mapper) { return pointsOf(mapper.points()); })
-      .def("trajectory", [](const Mapper& mapper) { return posesOf(mapper.trajectory()); })
-      .def("warnings", [](const Mapper& mapper) {
-        std::vector<std::pair<std::string, std::string>> warnings;
-        for (const Warning& warning : mapper.warnings()) {
-          warnings.emplace_back(warning.name, warning.text);
-        }
-        return warnings;
-      });
+      .def(
+          "warnings",
+          [](const Mapper& mapper) {
+            std::vector<std::pair<std::string, std::string>> warnings;
+            for (const Warning& warning : mapper.warnings()) {
+              warnings.emplace_back(warning.name, pythonText(warning.text));
+            }
+            return warnings;
+          },
+          releases);
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_engine, module) {
   PYBIND11_NUMPY_DTYPE(EventRecord, x, y, p, t);
+  PYBIND11_NUMPY_DTYPE(PointRecord, x, y, z, intensity, support, sigma);
   module.attr("VERSION") = EFM_VERSION;
+  module.def("python_text", &pythonText);
   module.attr("EVENT_DTYPE") = py::dtype::of<EventRecord>();
   translateErrors();
   defineCameras(module);
@@ -392,6 +462,12 @@ PYBIND11_MODULE(_engine, module) {
   defineRecordings(module);
   defineMapper(module);
   defineJobs(module);
+  // At Python's exit, after the mappers are stopped.
+  module.def("wait_for_calls", [] {
+    ReleasedCalls::ending() = true;
+    const py::gil_scoped_release released;
+    while (ReleasedCalls::count() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
 }
 
 }  // namespace efm

@@ -91,7 +91,7 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
   std::shared_ptr<const Keyframe> made;
   MapResult result;
   {
-    const py::gil_scoped_release released;
+    const Released released;
     MapJob job = jobOf(source, options, nullptr, on_progress);
     FusionMapperOptions& mapper = job.options.mapper;
     mapper.only_window = windowOf(t0_ns, t1_ns, mapper.policy.reference);
@@ -190,12 +190,12 @@ void writePoses(const Path& file, const py::array_t<std::int64_t>& times_ns,
 }  // namespace
 
 void defineJobs(py::module_& module) {
-  const py::call_guard<py::gil_scoped_release> releases;
+  const py::call_guard<Released> releases;
   py::class_<StopFlag, std::shared_ptr<StopFlag>>(module, "StopFlag")
       .def(py::init([] { return std::make_shared<StopFlag>(false); }))
       .def("set", [](StopFlag& flag) { flag = true; });
   py::class_<MapResult>(module, "MapResult")
-      .def_property_readonly("points", [](const MapResult& r) { return pointsOf(r.map->points); })
+      .def_property_readonly("points", [](const MapResult& r) { return pointsOf(*r.map->points); })
       .def_property_readonly("trajectory",
                              [](const MapResult& r) { return posesOf(r.map->trajectory); })
       .def_property_readonly("tracker_trajectory",

@@ -41,6 +41,32 @@ def write(path, text):
     unfinished.replace(path)
 
 
+def read_status(path):
+    """Returns the status of a finished run; None if there is none, or if its file is damaged."""
+    status = read_json(path)
+    keys = {"status": int, "tries": int, "has_report": bool, "arguments": list}
+    if isinstance(status, dict) and all(isinstance(status.get(key), kind) for key, kind in keys.items()):
+        return status
+    return None
+
+
+def plain_quotes(line):
+    r"""Replaces $'\303\244 b', as Bash's `printf %q` writes names in a C locale, by quotes that shlex reads."""
+    named = {"n": 10, "t": 9, "r": 13, "a": 7, "b": 8, "e": 27, "E": 27, "f": 12, "v": 11}
+
+    def byte(match):
+        code = match[1].decode("latin-1")
+        if code[0] in "01234567":
+            return bytes([int(code, 8) & 255])
+        return bytes([int(code[1:], 16) if code[0] == "x" and len(code) > 1 else named.get(code, ord(code[0]))])
+
+    def quoted(match):
+        escaped = os.fsencode(match[1])
+        return shlex.quote(os.fsdecode(re.sub(rb"\\([0-7]{1,3}|x[0-9a-fA-F]{1,2}|.)", byte, escaped)))
+
+    return re.sub(r"\$'((?:[^'\\]|\\.)*)'", quoted, line)
+
+
 def read_list(path):
     """Returns {name: arguments of `event-fusion map`} in the order of the list."""
     found = {}
@@ -54,7 +80,7 @@ def read_list(path):
             continue
         where = f"{path}:{number}"
         try:
-            words = shlex.split(line)
+            words = shlex.split(plain_quotes(line))
         except ValueError as error:
             fail(f"{where}: {error}")
         name = words.pop(0)[:-1] if words[0].endswith(":") else None
@@ -79,23 +105,21 @@ def jobs(list_file, out, *options):
     script = os.path.abspath(__file__)
     text = "".join(shlex.join([script, "run", str(out), name, *arguments, *options]) + "\n"
                    for name, arguments in recordings.items())
-    file = out / "jobs"
-    if not file.exists() or file.read_text(errors="surrogateescape") != text:
-        # GNU parallel's joblog holds numbers of lines of the old file. OUT/log tells what is finished.
-        (out / "joblog").unlink(missing_ok=True)
-        write(file, text)
+    # OUT/log tells what is finished, not the joblog of an earlier call.
+    (out / "joblog").unlink(missing_ok=True)
+    write(out / "jobs", text)
 
 
 def run(out, name, *arguments):
     status_file = out / "log" / f"{name}.status"
-    earlier = read_json(status_file)
+    earlier = read_status(status_file)
+    report = out / name / "report.json"
     tries = 1
     if earlier and earlier["arguments"] == list(arguments):
-        if earlier["status"] in FINAL:
+        if earlier["status"] in FINAL and (report.exists() or not earlier["has_report"]):
             return 0
         tries = earlier["tries"] + 1
     status_file.unlink(missing_ok=True)
-    report = out / name / "report.json"
     earlier_report = report.stat().st_mtime_ns if report.exists() else 0
     # The engines send their signals to the program, too. This script stays and writes the status.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -130,7 +154,10 @@ def row(out, name):
     cells = dict.fromkeys(COLUMNS, "-")
     cells["recording"] = name
     log = out / "log" / f"{name}.log"
-    done = read_json(log.with_name(f"{name}.status"))
+    done = read_status(log.with_name(f"{name}.status"))
+    if done and done["has_report"] and not (out / name / "report.json").exists():
+        cells.update(status="not run", reason="its result was removed")
+        return cells
     if not done:
         cells["status"] = "unfinished" if log.exists() else "not run"
         return cells
@@ -141,9 +168,11 @@ def row(out, name):
                      seconds=f"{report['seconds']['total']:.1f}")
     if status == 0:
         cells["status"] = "mapped"
-        warnings = {warning["name"] for warning in report["warnings"]} if report else None
-        if warnings:
-            cells["reason"] = "warnings: " + ", ".join(sorted(warnings))
+        warnings = {warning["name"] for warning in report["warnings"]} if report else set()
+        reasons = ["warnings: " + ", ".join(sorted(warnings))] if warnings else []
+        if report and report.get("doubtful"):
+            reasons.insert(0, "doubtful: " + ", ".join(report["doubtful"]))
+        cells["reason"] = "; ".join(reasons) or "-"
     elif status == 130:
         cells.update(status="stopped", reason="stopped as requested")
     elif status > 128:

@@ -101,8 +101,8 @@ using Keyframe = KeyframeDepthMap;
 /// Losses and errors are counted (LiveStatus) and logged.
 class Mapper {
  public:
-  /// The callbacks run in the thread that maps, and may use the mapper. In live operation they may
-  /// drop the last reference to it.
+  /// The callbacks run in the thread that maps, and may use the mapper. They may drop the last
+  /// reference to it: it ends after the callback.
   struct Callbacks {
     std::function<void(const Keyframe&)> on_keyframe;  ///< In the order of their windows.
     /// Live operation: receives each new snapshot of the map.
@@ -159,13 +159,16 @@ class Mapper {
 
   /// Returns the map so far; in live operation its newest snapshot. Never null.
   std::shared_ptr<const MapSnapshot> snapshot() const;
+  /// Returns the points. Their floats are relative to the cloud's `sensor_origin_`, which is not 0
+  /// far from the world's origin: `positionIn(*cloud, point)` is a point in the world, in doubles.
   MapCloud::ConstPtr points() const { return snapshot()->points; }
   /// Returns the snapshot. In playback it has no points, because they cost an export of the map.
   std::shared_ptr<const MapSnapshot> keyframes() const;
   std::vector<StampedPose> trajectory() const { return keyframes()->trajectory; }
   SessionStatus status() const;
   /// Returns the warnings so far: poses and cameras that do not explain the events, implausible
-  /// own data, unused data, and after `finish` why there is no keyframe. Own events are judged in
+  /// own data, unused data, and after `finish` why there is no keyframe, and coordinates that are
+  /// too far for floats (`far-coordinates`: it exports the map). Own events are judged in
   /// playback, poses against events if options are automatic; `mapRecording` judges always.
   std::vector<Warning> warnings() const;
 

@@ -85,18 +85,6 @@ void warnOfNoPoints(MapReport& report) {
       pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths);
 }
 
-void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
-  const auto step_m = coarseStepOf(cloud, report.options.cloud.voxel_size_m);
-  if (!step_m) return;
-  const auto& origin = cloud.sensor_origin_;
-  addWarning(report.warnings, "far-coordinates",
-             "a float has steps of {:.2g} m at the map's coordinates, over a tenth of a "
-             "voxel: x, y and z of the PCD file are relative to its VIEWPOINT, ({:.0f}, "
-             "{:.0f}, {:.0f}), which viewers do not add; MRPT's maps of points are rounded; "
-             "map.ply has doubles (--set output.ply=true)",
-             *step_m, origin.x(), origin.y(), origin.z());
-}
-
 /// Writes map.simplemap. Without MRPT, gives a note instead.
 void writeSimpleMap(const MapJob& job, MapOutput& output,
                     const std::vector<StoredKeyframe>& keyframes) {
@@ -376,7 +364,9 @@ void MapSteps::judgePoints(const MapCloud& points) {
   if (report.points < kFewPoints && report.counts.keyframes > 0) {
     report.doubts.push_back(fmt::format("the map has {} points", report.points));
   }
-  warnOfFarPoints(points, report);
+  if (auto warning = farPointsWarning(points, report.options.cloud.voxel_size_m)) {
+    report.warnings.push_back(std::move(*warning));
+  }
 }
 
 void MapSteps::endTimes(const KeyframeWriter& writer) {

@@ -22,6 +22,7 @@
 #include "mapping/survey/depth_agreement.h"
 #include "mapping/survey/option_choice.h"
 #include "mapping/survey/pose_check.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
@@ -123,6 +124,9 @@ std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, boo
 /// Returns the warnings of the readers, and those of lost packets, of events without a time and of
 /// skipped events.
 std::vector<Warning> lossWarnings(const RecordingCounts& counts);
+
+/// Returns the warning `far-coordinates` if floats are too coarse for the points of a map.
+std::optional<Warning> farPointsWarning(const MapCloud& cloud, double voxel_size_m);
 
 /// Returns the warning that automatic options were chosen without a scene.
 Warning noSceneWarning();

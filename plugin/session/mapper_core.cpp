@@ -44,6 +44,7 @@ MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                        const std::vector<StoredKeyframe>& earlier)
     : options_(options.live),
       callbacks_(std::move(callbacks)),
+      voxel_size_m_(options.cloud.voxel_size_m),
       setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
       statistics_(statisticsOptions(withSetup(options, setup_))),
       session_(withSetup(options, setup_)) {
@@ -104,11 +105,10 @@ void MapperCore::addEvents(int camera, std::vector<Event> events) {
   }
   packet.camera = camera;
   packet.events = std::move(events);
-  if (!queue_) {  // in live operation this time is the sensor's
-    const std::lock_guard<std::mutex> lock(statistics_mutex_);
-    statistics_.addEvents(packet);
-  }
-  add(std::move(packet));
+  if (queue_) return queue_->add(std::move(packet));
+  Batch batch;
+  batch.packets.push_back(std::move(packet));
+  workHere(std::move(batch), true);
 }
 
 /// Adds an empty packet of each camera. It maps nothing, so no callback waits for cameras_mutex_.
@@ -128,7 +128,7 @@ void MapperCore::announce(EventPacket packet) {
   if (error) std::rethrow_exception(error);
 }
 
-std::vector<Warning> MapperCore::warnings() const {
+std::vector<Warning> MapperCore::warnings() {
   bool ended = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -148,6 +148,8 @@ std::vector<Warning> MapperCore::warnings() const {
   findings.session = &state;
   findings.options = &options;
   std::vector<Warning> warnings = warningsOf(findings);
+  const auto far = ended ? farPointsWarning(*newest(true)->points, voxel_size_m_) : std::nullopt;
+  if (far) warnings.push_back(*far);
   const auto no_keyframe = ended ? noKeyframe(state, options) : std::nullopt;
   if (no_keyframe) warnings.insert(warnings.begin(), *no_keyframe);
   return warnings;
@@ -158,7 +160,7 @@ FusionMapperOptions MapperCore::usedOptions() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return used_options_;
   }
-  const std::lock_guard<std::mutex> lock(session_mutex_);
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
   return session_.usedOptions();
 }
 
@@ -169,7 +171,8 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
     warn(warning->name + ": " + warning->text, error);
   }
   for (const Warning& warning : warnings()) {
-    if (warning.name == "poses-blur") warn(warning.name + ": " + warning.text, error);
+    if (warning.name == "poses-blur" || warning.name == "far-coordinates")
+      warn(warning.name + ": " + warning.text, error);
   }
 }
 
@@ -193,13 +196,14 @@ void MapperCore::skip(const EventPacket& packet) {
   Batch batch;
   batch.packets.push_back(skippedPacket(packet));
   {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     paused_events_[packet.camera] += packet.events.size();
   }
   workHere(std::move(batch));
 }
 
 void MapperCore::finish() {
+  const auto kept = weak_from_this().lock();
   if (!queue_) {
     Batch end;
     end.ended = true;
@@ -222,7 +226,7 @@ void MapperCore::finish() {
 
 void MapperCore::stop() {
   if (!queue_) {
-    const std::lock_guard<std::mutex> lock(session_mutex_);  // waits for the current keyframe
+    const std::lock_guard<TurnMutex> lock(session_mutex_);  // waits for the current keyframe
     stopped_ = true;
     return;
   }
@@ -234,9 +238,11 @@ void MapperCore::stop() {
 }
 
 /// Feeds and maps a batch in the caller's thread.
-void MapperCore::workHere(Batch batch) {
+/// @param own_events true for events of `addEvents`, which the warnings judge.
+void MapperCore::workHere(Batch batch, bool own_events) {
+  const auto kept = weak_from_this().lock();  // a callback may drop the last reference
   std::exception_ptr error;
-  feed(std::move(batch), error);
+  feed(std::move(batch), error, own_events);
   while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
   }
   if (error) std::rethrow_exception(error);
@@ -289,11 +295,11 @@ void MapperCore::endRun(std::exception_ptr error) {
 /// Feeds the session.
 /// @param error receives the first error; in live operation only an error of the end, because
 /// `attempt` counts and logs the others.
-void MapperCore::feed(Batch batch, std::exception_ptr& error) {
+void MapperCore::feed(Batch batch, std::exception_ptr& error, bool own_events) {
   std::exception_ptr ignored;
   std::exception_ptr& of_input = queue_ ? ignored : error;
   {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     if (finished_ && !queue_ && !batch.ended) {
       throw std::logic_error("input after the end: `finish` was called");
     }
@@ -312,9 +318,13 @@ void MapperCore::feed(Batch batch, std::exception_ptr& error) {
       attempt(of_input, Fault::kEvents, "", [&] {
         if (packet.skipped_until_ns) {
           session_.noteMissing(packet.camera, {*packet.skipped_until_ns, DropReason::kPaused});
-        } else {
-          session_.addEvents(std::move(packet));
+          return;
         }
+        const EventPacket own = own_events ? packet : EventPacket();
+        session_.addEvents(std::move(packet));
+        if (!own_events) return;
+        const std::lock_guard<std::mutex> events_lock(statistics_mutex_);
+        statistics_.addEvents(own);
       });
     }
     if (batch.ended && !std::exchange(finished_, true)) {
@@ -330,7 +340,7 @@ bool MapperCore::mapNext(std::exception_ptr& error) {
   std::vector<std::string> warnings;
   bool goes_on = false;
   {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     // Within a callback in playback, the caller of the callback maps.
     if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
     if (queue_) {  // old windows are dropped for the newest input
@@ -428,7 +438,7 @@ std::shared_ptr<const MapSnapshot> MapperCore::newest(bool with_points) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return map_;
   }
-  const std::lock_guard<std::mutex> lock(session_mutex_);
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
   return makeSnapshot(with_points);
 }
 
@@ -439,7 +449,7 @@ void MapperCore::publishMap(bool at_once, std::exception_ptr& error) {
   if (!is_due && !at_once) return;
   std::shared_ptr<const MapSnapshot> made;
   const bool done = attempt(error, Fault::kMapping, "the snapshot of the map", [&] {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     made = makeSnapshot(true);
   });
   map_renewed_ = Clock::now();
@@ -462,7 +472,7 @@ void MapperCore::publishState(std::exception_ptr& error) {
   bool is_new_choice = false;
   bool is_first_blur = false;
   {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     const std::uint64_t choices = session_.chosen().choices;
     is_new_choice = std::exchange(logged_choices_, choices) != choices;
     const bool blurs = session_.correctedKeyframes() > 0;
@@ -508,7 +518,7 @@ void MapperCore::publishState(std::exception_ptr& error) {
 
 SessionStatus MapperCore::status() const {
   if (!queue_) {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
     SessionStatus status = session_.status();
     status.paused_events = paused_events_;
     return status;
@@ -531,7 +541,7 @@ std::size_t MapperCore::numKeyframes() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return map_->keyframes.size();
   }
-  const std::lock_guard<std::mutex> lock(session_mutex_);
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
   return map_so_far_.keyframes.size();
 }
 
@@ -577,12 +587,12 @@ void MapperCore::callBack(std::exception_ptr& error, const char* name, const Cal
   bool is_outer = false;
   attempt(error, Fault::kCallback, name, [&] {
     {
-      const std::lock_guard<std::mutex> lock(session_mutex_);
+      const std::lock_guard<TurnMutex> lock(session_mutex_);
       is_outer = delivering_.insert(thread).second;
     }
     call();
   });
-  const std::lock_guard<std::mutex> lock(session_mutex_);
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
   if (is_outer) delivering_.erase(thread);
 }
 

@@ -29,6 +29,28 @@
 
 namespace efm {
 
+/// A mutex whose threads take turns: one that locks it again and again does not keep others out.
+class TurnMutex {
+ public:
+  void lock() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const std::uint64_t turn = next_++;
+    changed_.wait(lock, [&] { return turn == now_; });
+  }
+  void unlock() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++now_;
+    }
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t next_ = 0, now_ = 0;
+};
+
 /// The state of a Mapper. The thread of live operation shares it, so it may outlive the Mapper.
 /// Functions without a comment are those of Mapper.
 ///
@@ -41,13 +63,13 @@ namespace efm {
 /// In live operation errors of the mapping, the refinement and the callbacks are counted and
 /// logged; the window is dropped and the next one is tried. The snapshot of the map is renewed
 /// after each keyframe, as long as this takes at most a twentieth of the time.
-class MapperCore {
+class MapperCore : public std::enable_shared_from_this<MapperCore> {
  public:
   using Callbacks = Mapper::Callbacks;
 
   explicit MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                       const std::vector<StoredKeyframe>& earlier);
-  /// Makes a mapper whose callbacks may drop the last reference to it in live operation.
+  /// Makes a mapper whose callbacks may drop the last reference to it: it ends after the callback.
   static std::shared_ptr<MapperCore> make(const EventFusionOptions& options, Callbacks callbacks,
                                           const std::vector<StoredKeyframe>& earlier);
   ~MapperCore();
@@ -73,7 +95,7 @@ class MapperCore {
   /// Returns the pose of the rig on the tracked body, from the options.
   const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
   SessionStatus status() const;
-  std::vector<Warning> warnings() const;
+  std::vector<Warning> warnings();
   std::shared_ptr<const MapSnapshot> newest(bool with_points);
   std::size_t numKeyframes() const;
   /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
@@ -88,11 +110,11 @@ class MapperCore {
   // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
   FusionMapperOptions usedOptions() const;
   void noteEnd(std::exception_ptr& error);
-  void workHere(Batch batch);
+  void workHere(Batch batch, bool own_events = false);
   void announce(EventPacket packet);
   void run();
   bool runOnce();
-  void feed(Batch batch, std::exception_ptr& error);
+  void feed(Batch batch, std::exception_ptr& error, bool own_events = false);
   bool mapNext(std::exception_ptr& error);
   void endRun(std::exception_ptr error);
   void keep(StoredKeyframe keyframe);
@@ -111,6 +133,7 @@ class MapperCore {
 
   const LiveOptions options_;
   const Callbacks callbacks_;
+  const double voxel_size_m_;
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;
@@ -124,7 +147,7 @@ class MapperCore {
 
   // Guards the worker and the members below. It is held while a keyframe is made, and locked before
   // mutex_. In live operation only the mapper's thread locks it.
-  mutable std::mutex session_mutex_;
+  mutable TurnMutex session_mutex_;
   MappingSession session_;
   MapSnapshot map_so_far_;  // without points
   std::map<int, std::uint64_t> paused_events_;

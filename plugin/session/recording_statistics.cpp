@@ -122,9 +122,13 @@ void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
   const bool earlier = poses.last_ns && pose.t_ns < *poses.last_ns;
   poses.add(pose.t_ns, pose.t_ns, 1);
   if (!earlier) check.add(pose);
-  if (late) return;
-  motion.add(pose);
   if (!step_begin_) step_begin_ = window_begin_ = pose;
+  if (late) {  // poses may come in falling order
+    if (window_begin_->t_ns - pose.t_ns > window_ns) return;
+    max_shift_m = std::max(max_shift_m, distanceOf(window_begin_->T_world_rig, pose.T_world_rig));
+    return;
+  }
+  motion.add(pose);
   if (pose.t_ns - step_begin_->t_ns >= kMinStepNs) {
     const double step_s = secondsBetween(step_begin_->t_ns, pose.t_ns);
     const double step_m = distanceOf(step_begin_->T_world_rig, pose.T_world_rig);

@@ -245,7 +245,9 @@ void checkSession(const Findings& findings, Warnings& warnings) {
   addKeyframes(status, warnings);
   if (const auto warning = blurWarning(status, *findings.options)) warnings.push_back(*warning);
   addLosses(status, warnings);
-  if (status.scene_unknown) warnings.push_back(noSceneWarning());
+  if (status.scene_unknown && status.events && status.poses) {
+    warnings.push_back(noSceneWarning());
+  }
 }
 
 std::string motionText(const SessionStatus& status, const FusionMapperOptions& options) {
@@ -310,6 +312,20 @@ void dropExplainedBlur(std::vector<Warning>& warnings) {
   warnings.erase(std::remove_if(warnings.begin(), warnings.end(),
                                 [](const Warning& w) { return w.name == "poses-blur"; }),
                  warnings.end());
+}
+
+std::optional<Warning> farPointsWarning(const MapCloud& cloud, double voxel_size_m) {
+  const auto step_m = coarseStepOf(cloud, voxel_size_m);
+  if (!step_m) return std::nullopt;
+  const auto& origin = cloud.sensor_origin_;
+  return Warning{
+      "far-coordinates",
+      fmt::format(
+          "a float has steps of {:.2g} m at the map's coordinates, over a tenth of a voxel: "
+          "x, y and z of the PCD file and of PCL clouds are relative to their origin "
+          "(VIEWPOINT, sensor_origin_), ({:.0f}, {:.0f}, {:.0f}), which viewers do not add; "
+          "MRPT's maps of points are rounded; map.ply has doubles (--set output.ply=true)",
+          *step_m, origin.x(), origin.y(), origin.z())};
 }
 
 Warning noSceneWarning() {

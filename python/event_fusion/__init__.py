@@ -10,6 +10,11 @@ files: ``{"dsi.max_depth_m": 8}``. Errors of data and files are OSError, wrong a
 ('x', 'y', 'p', 't')
 """
 
+try:
+    import numpy as _numpy  # noqa: F401
+except ImportError as error:
+    raise ImportError("event_fusion needs NumPy (Debian: python3-numpy)") from error
+
 from . import _engine, evaluate
 from ._engine import EVENT_DTYPE, Camera, Keyframe, simulation_presets
 from ._events import EventFusionWarning, events

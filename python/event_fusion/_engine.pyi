@@ -11,6 +11,10 @@ _OnProgress = Optional[Callable[[str, float], Any]]
 _OnKeyframe = Optional[Callable[["Keyframe"], Any]]
 
 VERSION: str
+
+def python_text(text: str) -> str: ...
+def wait_for_calls() -> None: ...
+
 EVENT_DTYPE: np.dtype[Any]
 
 class Camera:

@@ -31,7 +31,7 @@ class EventFusionWarning(UserWarning):
     """A warning of the engine: its name, a colon and its text. The lists ``warnings`` have them, too."""
 
 
-def _ns_per(time_unit: str) -> int:
+def ns_per(time_unit: str) -> int:
     if time_unit not in _NS_PER:
         raise ValueError(f"time_unit = {time_unit!r}: expected one of {', '.join(_NS_PER)}")
     return _NS_PER[time_unit]
@@ -43,6 +43,27 @@ def whole(name: str, value: Any, what: str = "a whole number") -> int:
         return operator.index(value)
     except TypeError:
         raise TypeError(f"{name} = {value!r}: expected {what}, as an int") from None
+
+
+def column_of(name: str, values: Any) -> Array:
+    """Return an argument as an array; values that a mask hides are an error."""
+    mask = np.asarray(getattr(values, "mask", False))
+    hidden = np.any([mask[field] for field in mask.dtype.names], axis=0) if mask.dtype.names else mask
+    if isinstance(values, np.ma.MaskedArray) and hidden.any():
+        at = int(np.flatnonzero(hidden)[0])
+        raise ValueError(f"{name}[{at}] is masked: expected a value; .compressed() leaves masked ones out")
+    return np.asarray(values)
+
+
+def _polarities(column: Array) -> Array:
+    if column.dtype.kind not in "biuf":
+        raise TypeError(f"p: {column.dtype}: expected polarities 0 and 1, -1 and 1, or bools")
+    if column.dtype.kind != "b":
+        wrong = ~np.isin(column, (-1, 0, 1))
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise ValueError(f"p[{at}] = {column[at]}: expected polarity 0 or 1, or -1 or 1, or a bool")
+    return column > 0
 
 
 def _pixels(name: str, column: Array) -> Array:
@@ -67,7 +88,7 @@ def events(x: npt.ArrayLike, y: npt.ArrayLike, p: npt.ArrayLike, t: npt.ArrayLik
     x, y : array_like of int, shape (n,)
         Pixels, from 0.
     p : array_like, shape (n,)
-        Polarity: above 0, or True, if the pixel became brighter.
+        Polarity: 1 or True if the pixel became brighter; 0, -1 or False if darker.
     t : array_like, shape (n,)
         Times. Integers keep all digits.
     time_unit : {'ns', 'us', 'ms', 's'}
@@ -81,27 +102,28 @@ def events(x: npt.ArrayLike, y: npt.ArrayLike, p: npt.ArrayLike, t: npt.ArrayLik
     Raises
     ------
     ValueError
-        If the lengths differ, a pixel is not in 0 to 65535, or the unit is unknown.
+        If the lengths differ, a pixel is not in 0 to 65535, a polarity is another number, a value is masked, or the
+        unit is unknown.
 
     Examples
     --------
     >>> events([3], [4], [1], [2.5], time_unit="us")["t"]
     array([2500])
     """
-    factor = _ns_per(time_unit)
-    columns = [np.asarray(column) for column in (x, y, p, t)]
+    factor = ns_per(time_unit)
+    columns = [column_of(name, column) for name, column in zip("xypt", (x, y, p, t))]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         shapes = ", ".join(str(column.shape) for column in columns)
         raise ValueError(f"x, y, p, t have the shapes {shapes}: expected four columns of one length")
     made = np.empty(len(columns[0]), EVENT_DTYPE)
     made["x"] = _pixels("x", columns[0])
     made["y"] = _pixels("y", columns[1])
-    made["p"] = columns[2] > 0
-    made["t"] = _times_in_ns(columns[3], factor)
+    made["p"] = _polarities(columns[2])
+    made["t"] = times_in_ns(columns[3], factor)
     return made
 
 
-def _times_in_ns(times: Array, factor: int) -> Array:
+def times_in_ns(times: Array, factor: int) -> Array:
     def reject(wrong: Array, expected: str) -> None:
         if wrong.any():
             at = int(np.argmax(wrong))
@@ -125,7 +147,7 @@ def event_records(array: npt.ArrayLike, time_unit: str = "ns") -> Array:
 
     Other arrays are read by the names of their fields: x, y, p (or polarity) and t (or ts, timestamp).
     """
-    records = np.asarray(array)
+    records = column_of("events", array)
     if time_unit == "ns" and records.dtype == EVENT_DTYPE:
         return np.ascontiguousarray(records)
     names = records.dtype.names or ()
@@ -151,7 +173,7 @@ def in_unit(records: Array, time_unit: str) -> Array:
             made[name] = records[name]
         made["t"] = records["t"] * 1e-9
         return made
-    records["t"] //= _ns_per(time_unit)
+    records["t"] //= ns_per(time_unit)
     return records
 
 

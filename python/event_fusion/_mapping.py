@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import queue
@@ -25,9 +26,12 @@ from ._events import (
     Path,
     Progress,
     ProgressBar,
+    column_of,
     engine_options,
     event_records,
+    ns_per,
     times_in,
+    times_in_ns,
     whole,
 )
 from ._recording import Recording, open
@@ -40,6 +44,23 @@ def _warn(found: list[tuple[str, str]]) -> None:
         depth, frame = depth + 1, frame.f_back
     for name, text in found:
         python_warnings.warn(f"{name}: {text}", EventFusionWarning, stacklevel=depth)
+
+
+_endings: set[Any] = set()  # of mappers and maps
+
+
+def _end_with(owner: object, end: Callable[..., Any], *arguments: Any) -> None:
+    """Call a function when the owner is gone, or when Python exits."""
+    _endings.difference_update([ending for ending in _endings if not ending.alive])
+    _endings.add(weakref.finalize(owner, end, *arguments))
+
+
+@atexit.register
+def _end_all() -> None:
+    """Stop what maps: at its exit, Python kills threads, which the engine does not survive."""
+    for ending in list(_endings):
+        ending()
+    _engine.wait_for_calls()
 
 
 def _opened(recording: Recording | Path) -> Recording:
@@ -85,6 +106,7 @@ class Mapper:
         on_warning: Callable[[str], Any] | None = None,
     ) -> None:
         self._mapper = _engine.Mapper(engine_options(options), on_keyframe, on_warning)
+        _end_with(self, self._mapper.stop)
 
     def add_camera(self, camera: Camera) -> int:
         """Add a camera and return its index, from 0. All cameras come before the events."""
@@ -112,29 +134,37 @@ class Mapper:
         """
         self._mapper.add_events(camera, event_records(array, time_unit))
 
-    def add_pose(self, t: int, T_world_rig: npt.ArrayLike) -> None:
+    def add_pose(self, t: float, T_world_rig: npt.ArrayLike, time_unit: str = "ns") -> None:
         """Add the next pose, on the clock of the events. Events and poses may come in any order.
 
         Parameters
         ----------
-        t : int
-            Nanoseconds.
+        t : int or float
+            Time.
         T_world_rig : array_like, shape (4, 4) or (7,)
             A matrix, or tx ty tz qx qy qz qw as in a TUM file. (The last digits of a map depend on it: the rotation of
             a matrix is rounded when it becomes a quaternion.)
+        time_unit : {'ns', 'us', 'ms', 's'}
+            Unit of the time. Seconds as floats are exact to 0.2 µs today.
 
         Raises
         ------
         ValueError
             If the pose is not finite or not rigid, or a second older than the newest one.
         """
-        self.add_poses([whole("t", t, "nanoseconds")], np.asarray(T_world_rig, float)[None])
+        if time_unit == "ns":
+            whole("t", t, "nanoseconds")
+        self.add_poses([t], column_of("T_world_rig", T_world_rig)[None], time_unit)
 
-    def add_poses(self, t: npt.ArrayLike, T_world_rig: npt.ArrayLike) -> None:
-        """Add poses in the order of time: times (n,) in nanoseconds, and matrices (n, 4, 4) or rows (n, 7)."""
-        times, poses = np.asarray(t), np.asarray(T_world_rig, float)
-        if times.dtype.kind not in "iu" or times.ndim != 1:
-            raise TypeError(f"t: {times.dtype} of shape {times.shape}: expected nanoseconds, as ints")
+    def add_poses(self, t: npt.ArrayLike, T_world_rig: npt.ArrayLike, time_unit: str = "ns") -> None:
+        """Add poses in the order of time: times (n,) in a unit, and matrices (n, 4, 4) or rows (n, 7)."""
+        times, poses = column_of("t", t), np.asarray(column_of("T_world_rig", T_world_rig), float)
+        factor = ns_per(time_unit)
+        if len(times) == 0 and len(poses) == 0:
+            return
+        if times.dtype.kind not in "iuf" or times.ndim != 1 or (time_unit == "ns" and times.dtype.kind == "f"):
+            raise TypeError(f"t: {times.dtype} of shape {times.shape}: expected nanoseconds, as ints, or time_unit=")
+        times = times_in_ns(times, factor)
         if poses.shape not in ((len(times), 4, 4), (len(times), 7)):
             shape = poses.shape[1:]
             raise ValueError(
@@ -169,7 +199,7 @@ class Mapper:
 
     @property
     def points(self) -> Array:
-        """The map: a structured array with x, y, z (metres), intensity, support, sigma (metres); read-only."""
+        """The map so far, a copy: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres)."""
         return self._mapper.points()
 
     @property
@@ -252,14 +282,17 @@ class Map:
 
         self._recording = recording  # a simulated one is removed with its last user
         self._items = items
+        self._lock = threading.RLock()  # the threads that use the map take turns
         self._thread = threading.Thread(target=_run, args=(items, job), daemon=True, name="event_fusion.map")
-        weakref.finalize(self, _end, stop, items, self._thread, out is not None)
+        _end_with(self, _end, stop, items, self._thread, out is not None)
         self._thread.start()
 
     def _next(self) -> Keyframe | None:
-        """Wait for the next keyframe; None at the end."""
+        """Wait for the next keyframe; None at the end. The caller holds the lock."""
         if self._result is not None:
             return None
+        if threading.current_thread() is self._thread:
+            raise RuntimeError("a callback of the mapping waits for the mapping: use the map in another thread")
         if self._error is not None:
             raise self._error
         try:
@@ -284,22 +317,25 @@ class Map:
         return None
 
     def _finished(self) -> _engine.MapResult:
-        while self._next() is not None:
-            pass
-        assert self._result is not None
-        return self._result
+        with self._lock:
+            while self._next() is not None:
+                pass
+            assert self._result is not None
+            return self._result
 
     def __iter__(self) -> Iterator[Keyframe]:
-        if not self._keep:
-            if self._looped:
+        with self._lock:
+            if not self._keep and self._looped:
                 raise RuntimeError("keep=False: a loop over the map gives each keyframe once")
             self._looped = True
-            while (keyframe := self._next()) is not None:
-                yield keyframe
-            return
         at = 0
-        while at < len(self._made) or self._next() is not None:
-            yield self._made[at]
+        while True:
+            with self._lock:
+                known = self._keep and at < len(self._made)
+                keyframe = self._made[at] if known else self._next()
+            if keyframe is None:
+                return
+            yield keyframe
             at += 1
 
     def __repr__(self) -> str:
@@ -324,7 +360,7 @@ class Map:
 
     @cached_property
     def points(self) -> Array:
-        """The map: a structured array with x, y, z (metres), intensity, support, sigma (metres); read-only."""
+        """The map: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres)."""
         return self._finished().points
 
     @property
@@ -346,7 +382,7 @@ class Map:
     @property
     def warnings(self) -> list[tuple[str, str]]:
         """Names and texts of the warnings."""
-        return [(warning["name"], warning["text"]) for warning in self.report["warnings"]]
+        return [(warning["name"], _engine.python_text(warning["text"])) for warning in self.report["warnings"]]
 
     @property
     def doubts(self) -> list[str]:

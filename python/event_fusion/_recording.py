@@ -12,7 +12,7 @@ from typing import Any, Iterator, Sequence
 
 from . import _engine
 from ._engine import Camera
-from ._events import Array, Path, Progress, ProgressBar, in_unit, times_in, whole, _ns_per
+from ._events import Array, Path, Progress, ProgressBar, in_unit, times_in, ns_per, whole
 
 
 class Recording:
@@ -62,7 +62,7 @@ class Recording:
             raise ValueError(f"camera = {camera}: expected a camera of the recording: 0 to {len(self.rig) - 1}")
         if whole("chunk", chunk) < 1:
             raise ValueError(f"chunk = {chunk}: expected 1 or above")
-        _ns_per(time_unit)
+        ns_per(time_unit)
         return self._read(camera, chunk, time_unit)
 
     def _read(self, camera: int, chunk: int, time_unit: str) -> Iterator[Array]:

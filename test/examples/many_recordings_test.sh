@@ -56,5 +56,21 @@ map 0 list
 expect "repaired row" "$(row broken)" "broken mapped *"
 expect "calls after the repair" "$(wc -l <calls)" 5
 
+rm -r "out/one slider" # a removed result is made again, and so is one whose status file is damaged
+expect "removed row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider not run - - - its result was removed*"
+echo '{}' >out/log/killed.status
+map 0 list
+expect "calls after the removal" "$(wc -l <calls)" 7
+map 0 list
+expect "calls after one more run" "$(wc -l <calls)" 7
+
+mv broken $'br\303\266ken one' # as `printf %q` writes names in a C locale
+(LC_ALL=C printf '%q\n' br*) | sed "s/$/ --calibration 'one slider\/camchain.yaml'/" >names
+expect "escaped name" "$(cat names)" '$*\303\266*'
+sed -i 's/"doubtful"/"of before"/; s/^{/{ "doubtful": ["few events"],/' "out/one slider/report.json"
+map 0 names
+expect "row of the name" "$(row $'br\303\266ken')" $'br\303\266ken one mapped *'
+expect "doubtful row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider mapped *doubtful: few events*"
+
 [ $failures = 0 ] && echo "passed"
 exit $((failures > 0))

@@ -157,8 +157,12 @@ def test_arrays_of_other_programs_are_read_by_their_fields(desk, dtype, unit, pe
 
 def stereo_mapper():
     mapper = ef.Mapper(OPTIONS)
-    mapper.add_camera(ef.Camera(10, 10, np.array([[5, 0, 5], [0, 5, 5], [0, 0, 1.0]])))
+    mapper.add_camera(m_camera())
     return mapper
+
+
+def m_camera():
+    return ef.Camera(10, 10, np.array([[5, 0, 5], [0, 5, 5], [0, 0, 1.0]]))
 
 
 ERRORS = {
@@ -197,6 +201,32 @@ ERRORS = {
     "a map as a keyframe": (lambda: plot.depth("x.png"), TypeError, "keyframes"),
     "no limits": (lambda: plot.depth(np.ones((3, 4)), limits=(0, 5)), ValueError, "0 < near"),
     "a file of another kind": (lambda: stereo_mapper().save("map.txt"), ValueError, "pcd or .ply"),
+    "a masked pixel": (
+        lambda: ef.events(np.ma.masked_array([1, 2], [False, True]), [1, 1], [1, 1], [1, 2]),
+        ValueError,
+        r"x\[1\] is masked",
+    ),
+    "a masked pose": (
+        lambda: stereo_mapper().add_poses([1], np.ma.masked_invalid(np.full((1, 7), np.nan))),
+        ValueError,
+        "T_world_rig.*masked",
+    ),
+    "a transposed K": (lambda: ef.Camera(10, 10, [[5, 0, 0], [0, 5, 0], [5, 5, 1]]), ValueError, "K: expected"),
+    "a scaled K": (lambda: ef.Camera(10, 10, [[5, 0, 5], [0, 5, 5], [0, 0, 2]]), ValueError, "K: expected"),
+    "a polarity of 2": (lambda: ef.events([1], [1], [2], [1]), ValueError, r"p\[0\] = 2: expected polarity"),
+    "a polarity of 2 in records": (
+        lambda: stereo_mapper().add_events(0, np.array([(1, 1, 2, 5)], ef.EVENT_DTYPE)),
+        ValueError,
+        r"p\[0\] = 2: expected polarity",
+    ),
+    "a pose's unit": (lambda: stereo_mapper().add_poses([1.5], np.eye(4)[None], "minutes"), ValueError, "'minutes'"),
+    "a camera after events": (
+        lambda: (m := stereo_mapper(), m.add_events(0, ef.events([1], [1], [1], [1])), m.add_camera(m_camera())),
+        RuntimeError,
+        "after the first events",
+    ),
+    "a name that is not UTF-8": (lambda: ef.open("/no/\udcff"), OSError, "no such file"),
+    "no poses": (lambda: ef.map(os.path.join(DESK, "cam0", "events.txt")).points, OSError, "calibration=FILE"),
     "no pose": (lambda: stereo_mapper().add_pose(0, np.ones((3, 4))), ValueError, r"\(3, 4\)"),
 }
 
@@ -206,6 +236,44 @@ def test_mistakes_are_errors_that_name_the_value(name):
     call, kind, text = ERRORS[name]
     with pytest.raises(kind, match=text):
         call()
+
+
+def test_times_of_poses_have_a_unit_and_no_poses_are_none(desk, made):
+    maps = []
+    for unit, per in (("ns", 1), ("us", 1000), ("s", 1e9)):
+        mapper = ef.Mapper(OPTIONS)
+        for camera in desk.rig:
+            mapper.add_camera(camera)
+        times, poses = desk.poses
+        mapper.add_poses([], np.empty((0, 4, 4)))
+        mapper.add_poses(times / per if unit == "s" else times // per, poses, unit)
+        mapper.add_pose(int(times[-1]) + 1_000_000, poses[-1])
+        for camera in range(2):
+            mapper.add_events(camera, np.concatenate(list(desk.events(camera))))
+        mapper.finish()
+        maps.append(mapper.points)
+    for points in maps:
+        np.testing.assert_array_equal(points, maps[0])
+    assert abs(len(maps[0]) - len(made.points)) < 10  # a rotation as a matrix has other last digits
+
+
+def test_warnings_are_of_what_was_used(desk):
+    mapper = ef.Mapper(OPTIONS)
+    mapper.finish()
+    assert [name for name, _ in mapper.warnings] == ["no-keyframe"]
+    mapper = ef.Mapper(OPTIONS)
+    for camera in desk.rig:
+        mapper.add_camera(camera)
+    times, poses = desk.poses
+    for i in range(0, len(times), 500):  # in falling order within half a second
+        mapper.add_poses(times[i : i + 500][::-1], poses[i : i + 500][::-1])
+    for camera in range(2):
+        mapper.add_events(camera, np.concatenate(list(desk.events(camera))))
+    with pytest.raises(ValueError):  # outside the sensor
+        mapper.add_events(0, ef.events([999], [0], [1], [int(times[-1]) + 100 * 10**9]))
+    mapper.finish()
+    assert not {"clock-overlap", "no-motion", "rotation-only"} & {name for name, _ in mapper.warnings}, mapper.warnings
+    assert len(mapper.points) > 1000
 
 
 def test_the_exception_of_a_callback_ends_the_call(desk):
@@ -336,7 +404,7 @@ def test_events_are_read_without_poses_and_calibration(desk, tmp_path):
     assert len(alone.poses[0]) == 0 and alone.rig[0].K[0, 0] == 0
     for unit, per in (("us", 1000), ("s", 1e9)):
         np.testing.assert_allclose(next(alone.events(0, 1000, unit))["t"], part["t"] // per if unit == "us" else part["t"] / per)
-    with pytest.raises(OSError, match="--calibration"):
+    with pytest.raises(OSError, match="or calibration=FILE"):
         ef.map(alone).points
 
 
@@ -422,6 +490,140 @@ def test_a_live_mapper_maps_in_its_own_thread(desk):
     mapper.finish()
     assert mapper.status == {"keyframes": len(keyframes), "drop_ratio": 0}
     assert len(keyframes) > 1 and len(mapper.points) > 1000
+
+
+def test_points_are_in_the_world_wherever_it_is(desk, made, tmp_path):
+    far = np.array([500_000, 4_500_000, 100.0])
+    times, poses = desk.poses
+    poses = poses.copy()
+    poses[:, :3, 3] += far
+    np.savez(tmp_path / "utm.npz", t_ns=times, poses=poses)
+    recording = ef.open(DESK, poses=tmp_path / "utm.npz")
+    mapper = ef.Mapper(OPTIONS)
+    for camera in desk.rig:
+        mapper.add_camera(camera)
+    mapper.add_poses(times, poses)
+    for camera in range(2):
+        mapper.add_events(camera, np.concatenate(list(desk.events(camera))))
+    with pytest.warns(ef.EventFusionWarning, match="far-coordinates"):
+        mapper.finish()
+    with pytest.warns(ef.EventFusionWarning, match="far-coordinates"):
+        by_map = ef.map(recording, OPTIONS)
+        by_map.points
+    near = np.median([made.points[axis] for axis in "xyz"], axis=1)
+    for one in (mapper, by_map):
+        np.testing.assert_allclose(np.median([one.points[axis] for axis in "xyz"], axis=1), near + far, atol=0.01)
+        one.save(tmp_path / "map.ply")
+        assert ef.evaluate.map(one, tmp_path / "map.ply")["accuracy"]["max_m"] < 1e-6
+    mapper.save(tmp_path / "map.pcd")
+    assert ef.evaluate.map(mapper, tmp_path / "map.pcd")["accuracy"]["max_m"] < 1e-6
+
+
+def in_threads(count, call):
+    """Call a function in threads; return their results and exceptions. It fails where one does not end."""
+    results = []
+
+    def run():
+        try:
+            results.append(call())
+        except Exception as error:
+            results.append(error)
+
+    threads = [threading.Thread(target=run, daemon=True) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)
+    return results
+
+
+def test_threads_may_share_a_map_a_reader_and_a_mapper(desk, made):
+    times = [k.t for k in made]
+    shared = ef.map(desk, OPTIONS)
+    assert in_threads(4, lambda: [k.t for k in shared]) == [times] * 4
+    once = ef.map(desk, OPTIONS, keep=False)
+    results = in_threads(4, lambda: [k.t for k in once])
+    assert sum(isinstance(r, RuntimeError) for r in results) == 3 and times in results
+    reader = ef._engine.EventReader(desk._source)
+    parts = in_threads(4, lambda: read_all(reader))
+    assert sum(len(part) for parts_of_one in parts for part in parts_of_one) == sum(map(len, desk.events(0)))
+
+    # A thread that asks for the points again and again keeps neither others nor the interpreter waiting.
+    mapper = ef.Mapper({**OPTIONS, "live.max_queue_mb": 1})
+    for camera in desk.rig:
+        mapper.add_camera(camera)
+    mapper.add_poses(*desk.poses)
+    done, polls = threading.Event(), []
+
+    def poll():
+        while not done.is_set():
+            polls.append(len(mapper.points) + mapper.status["keyframes"] + len(mapper.trajectory[0]))
+
+    poller = threading.Thread(target=poll, daemon=True)
+    poller.start()
+    begin = time.monotonic()
+    for camera in range(2):
+        for part in desk.events(camera, 100_000):
+            mapper.add_events(camera, part)
+    mapper.finish()
+    done.set()
+    poller.join(30)
+    assert not poller.is_alive() and len(polls) > 0 and mapper.status["keyframes"] > 1
+    assert time.monotonic() - begin < 60
+
+
+def read_all(reader):
+    parts = []
+    while len(part := reader.next(0, 10_000)) > 0:
+        parts.append(part)
+    return parts
+
+
+ENDS = {
+    "a live callback runs": """
+def slow(keyframe):
+    for _ in range(20):
+        time.sleep(0.005)
+mapper = ef.Mapper({**OPTIONS, "live.enabled": True}, slow)
+mapper.add_recording(desk)
+time.sleep(0.3)
+""",
+    "a daemon thread finishes": """
+mapper = ef.Mapper({**OPTIONS, "live.enabled": True})
+mapper.add_recording(desk)
+threading.Thread(target=mapper.finish, daemon=True).start()
+time.sleep(0.05)
+""",
+    "a daemon thread maps in playback": """
+mapper = ef.Mapper(OPTIONS)
+threading.Thread(target=lambda: (mapper.add_recording(desk), mapper.finish()), daemon=True).start()
+time.sleep(0.3)
+""",
+    "a map goes on": """
+made = ef.map(desk, OPTIONS)
+next(iter(made))
+""",
+    "a daemon thread simulates": """
+threading.Thread(target=lambda: ef.simulate("slider", duration=2), daemon=True).start()
+time.sleep(0.3)
+""",
+    "the callback drops the mapper": """
+def drop(keyframe):
+    global mapper
+    mapper = None
+mapper = ef.Mapper(OPTIONS, drop)
+mapper.add_recording(desk)
+(mapper or ef.Mapper()).finish()
+""",
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_python_ends_while(name):
+    code = f"import threading, time, event_fusion as ef\nOPTIONS = {OPTIONS}\ndesk = ef.open({DESK!r})\n" + ENDS[name]
+    ended = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 0, ended.stderr
 
 
 def test_warnings_are_warnings_of_python(desk):

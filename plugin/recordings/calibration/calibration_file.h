@@ -87,4 +87,9 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 /// @param calibration the rig's calibration, which the last two kinds need; null: none is given.
 Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration = nullptr);
 
+/// Returns whether nine numbers, row by row, are fx 0 cx, 0 fy cy, 0 0 1.
+inline bool isCameraMatrix(const std::vector<double>& k) {
+  return k.size() == 9 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
+}
+
 }  // namespace efm

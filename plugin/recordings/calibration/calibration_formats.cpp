@@ -155,7 +155,7 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
   std::vector<double> k = form.is_matrix ? numbersAt(entry, form.intrinsics, 9, kMatrix)
                                          : numbersAt(entry, form.intrinsics, 4, "4, fx fy cx cy");
   if (form.is_matrix) {
-    if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+    if (!isCameraMatrix(k)) {
       const auto [place, names] = placeOf(entry, form.intrinsics);
       throw place.failKey(names[0].c_str(), "a matrix with skew or another last row", kMatrix);
     }

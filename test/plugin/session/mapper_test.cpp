@@ -292,6 +292,43 @@ TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
   EXPECT_EQ(mapper->status().counts.keyframes, 1U);
 }
 
+TEST(Mapper, InPlaybackAHostMayDropItsLastReferenceInAKeyframesCallback) {
+  const Samples samples = announced(SyntheticRecording());
+  for (const bool in_finish : {false, true}) {
+    EventFusionOptions options = syntheticOptions();
+    if (in_finish) options.automatic = defaultOptions().automatic;  // nothing is mapped before
+    std::shared_ptr<Mapper> mapper;
+    int calls = 0;
+    Mapper::Callbacks callbacks;
+    callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
+      ++calls;
+      mapper.reset();
+    };
+    mapper = std::make_shared<Mapper>(options, callbacks);
+    for (const Sample& sample : samples) {
+      if (mapper) mapper->add(sample);
+    }
+    EXPECT_EQ(mapper == nullptr, !in_finish);
+    if (mapper) mapper->finish();
+    EXPECT_EQ(mapper, nullptr);
+    EXPECT_EQ(calls, 1) << "the mapper has ended";
+  }
+}
+
+TEST(Mapper, WarningsAreOfTheEventsThatWereTakenAndOfPosesInAnyOrder) {
+  const SyntheticRecording recording(0.8);
+  Mapper mapper(syntheticOptions());
+  for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+  for (auto pose = recording.poses.rbegin(); pose != recording.poses.rend(); ++pose) {
+    mapper.addPose(*pose);  // within a second
+  }
+  for (int c = 0; c < 2; ++c) mapper.addEvents(c, recording.events[std::size_t(c)]);
+  EXPECT_THROW(mapper.addEvents(0, {{kMsNs * 1'000'000, 9999, 0, true}}), std::invalid_argument);
+  mapper.finish();
+  EXPECT_THAT(mapper.warnings(), testing::IsEmpty()) << mapper.warnings()[0].text;
+  EXPECT_GT(mapper.trajectory().size(), 1U);
+}
+
 // --- Errors ------------------------------------------------------------------------------------
 
 TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
