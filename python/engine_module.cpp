@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -281,6 +282,16 @@ ValueError
       });
 }
 
+/// Returns a copy of an array as an image.
+cv::Mat1f imageFrom(const py::handle& pickled) {
+  using Image = py::array_t<float, py::array::c_style | py::array::forcecast>;
+  const auto array = pickled.cast<Image>();
+  if (array.ndim() != 2) throw std::invalid_argument("a pickled keyframe: expected images");
+  return cv::Mat1f(static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
+                   const_cast<float*>(array.data()))
+      .clone();
+}
+
 /// Returns the standard deviation of each depth, in metres; 0 where there is no depth.
 cv::Mat1f sigmaOf(const DepthMap& map) {
   cv::Mat1f sigma = cv::Mat1f::zeros(map.depth.size());
@@ -345,6 +356,31 @@ K : numpy.ndarray, float64, shape (3, 3)
                              [](const Keyframe& k) { return arrayOf(matrixOf(k.T_world_ref)); })
       .def_property_readonly(
           "K", [](const Keyframe& k) { return kOf(k.view.fx, k.view.fy, k.view.cx, k.view.cy); })
+      .def(py::pickle(
+          [](const Keyframe& k) {
+            const Eigen::Quaterniond& q = k.T_world_ref.rotation;
+            const Eigen::Vector3d& p = k.T_world_ref.translation;
+            return py::make_tuple(k.window.t0_ns, k.window.t1_ns, k.window.t_ref_ns,
+                                  std::array{p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()},
+                                  std::array{k.view.fx, k.view.fy, k.view.cx, k.view.cy},
+                                  imageOf(k.map.depth), imageOf(k.map.confidence),
+                                  imageOf(k.map.variance));
+          },
+          [](const py::tuple& state) {
+            auto keyframe = std::make_shared<Keyframe>();
+            const auto pose = state[3].cast<std::array<double, 7>>();
+            const auto view = state[4].cast<std::array<double, 4>>();
+            keyframe->window = {state[0].cast<std::int64_t>(), state[1].cast<std::int64_t>(),
+                                state[2].cast<std::int64_t>()};
+            keyframe->T_world_ref = {{pose[6], pose[3], pose[4], pose[5]},
+                                     {pose[0], pose[1], pose[2]}};
+            keyframe->map.depth = imageFrom(state[5]);
+            keyframe->map.confidence = imageFrom(state[6]);
+            keyframe->map.variance = imageFrom(state[7]);
+            const cv::Size size = keyframe->map.depth.size();
+            keyframe->view = {size.width, size.height, view[0], view[1], view[2], view[3]};
+            return keyframe;
+          }))
       .def("__repr__", [](const Keyframe& k) {
         return fmt::format("<Keyframe at {} ns: {} depths>", k.window.t_ref_ns,
                            cv::countNonZero(k.map.depth));

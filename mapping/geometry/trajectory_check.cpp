@@ -43,18 +43,35 @@ bool isViolent(const StampedPose& a, const StampedPose& b, const StampedPose& c)
 }  // namespace
 
 void TrajectoryCheck::add(const StampedPose& pose) {
-  constexpr std::size_t kLastPoses = 32;
+  constexpr std::size_t kLastPoses = 128;
   compareWithSameTime(pose);
-  if (!last_.empty()) lookForChange(pose);
-  last_.push_back(pose);
-  if (last_.size() > kLastPoses) last_.pop_front();
+  if (takes_lost_ || !isLost(pose)) {
+    if (!last_.empty()) lookForChange(pose);
+    last_.push_back(pose);
+    numbers_.push_back(changes_.of);
+    if (last_.size() > kLastPoses) {
+      last_.pop_front();
+      numbers_.pop_front();
+    }
+  }
   ++changes_.of;
+}
+
+/// Returns whether a pose is the identity, or repeats a pose that is not the one before it.
+bool TrajectoryCheck::isLost(const StampedPose& pose) {
+  for (std::size_t i = 0; i + 1 < last_.size(); ++i) {
+    if (isSame(last_[i].T_world_rig, pose.T_world_rig) &&
+        !isSame(last_[i].T_world_rig, last_.back().T_world_rig)) {
+      lost_ = pose.T_world_rig;
+    }
+  }
+  return isSame(pose.T_world_rig, Rigid3()) || isSame(pose.T_world_rig, lost_);
 }
 
 void TrajectoryCheck::compareWithSameTime(const StampedPose& pose) {
   constexpr double kSameM = 1e-3;
   constexpr double kSameRad = 0.1 * kRadiansPerDegree;
-  if (last_.empty() || pose.t_ns != of_time_.t_ns) {
+  if (equal_times_.of == 0 || pose.t_ns != of_time_.t_ns) {
     of_time_ = pose;
     of_time_number_ = changes_.of;
     differs_ = false;
@@ -75,11 +92,13 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
   const double distance = distanceBetween(before, pose);
   if (distance < kMinDistance || last_.size() < 2) return;
   if (!isViolent(last_[last_.size() - 2], before, pose)) return;
+  if (2 * distance * static_cast<double>(changes_.count) > sum_) ++leaps_;  // not a usual step
   for (std::size_t i = last_.size() - 1; i-- > 0;) {
     const StampedPose& earlier = last_[i];
     if (pose.t_ns - earlier.t_ns > kMaxTimeNs) return;
     if (distanceBetween(earlier, pose) < distance / 4) {
-      return count(before, changes_.of - 1, pose, changes_.of, changes_);
+      sum_ += distance;
+      return count(before, numbers_.back(), pose, changes_.of, changes_);
     }
     // Farther back than the places of several bodies, there are only poses of the place before.
     if (i + kMaxBodies < last_.size() && distanceBetween(earlier, before) > distance / 2) return;
@@ -89,7 +108,10 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
 std::optional<TrajectoryConflict> TrajectoryCheck::conflict() const {
   constexpr std::uint64_t kMinChanges = 8;
   if (100 * equal_times_.count > equal_times_.of) return equal_times_;
-  if (changes_.count >= kMinChanges && 20 * changes_.count > changes_.of) return changes_;
+  if (changes_.count >= kMinChanges && 200 * changes_.count > 3 * changes_.of &&
+      10 * changes_.count > 6 * leaps_) {
+    return changes_;
+  }
   return std::nullopt;
 }
 

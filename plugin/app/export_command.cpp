@@ -69,6 +69,7 @@ int runImport(const ImportArguments& arguments) {
   }
   printWarnings(missingParts(cameras, all_events > 0, poses > 0));
   printWarnings(lossWarnings(recording->counts()));
+  printWarnings(recording->counts().notes, "note");
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     printWarnings({{"hand-eye-left-out",
                     fmt::format("odometry ({} observations) cannot hold the hand-eye transform: "
@@ -168,6 +169,7 @@ int runExport(const ExportArguments& arguments) {
     if (source.limits.contain(truth.t_ns)) writer->addTruth(truth.t_ns, truth.file);
   }
   printWarnings(lossWarnings(recording->counts()));
+  printWarnings(recording->counts().notes, "note");
   if (events == 0 && damage) throw std::runtime_error(*damage);
   writer->close();
   if (arguments.verbosity != Verbosity::kQuiet) {

@@ -234,6 +234,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   Findings findings{first_.statistics, read};
   findings.use(planes, first_.chosen);
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
+  findings.voxel_size_m = report.options.cloud.voxel_size_m;
   if (stopped && status.events) findings.until_ns = status.events->last_ns;
   findings.session = &status;
   findings.options = &options;

@@ -141,7 +141,7 @@ void checkParts(const Findings& findings, Warnings& warnings) {
 }
 
 void checkDepths(const Findings& findings, Warnings& warnings) {
-  if (findings.depths) append(warnings, findings.depths->warnings());
+  if (findings.depths) append(warnings, findings.depths->warnings(findings.voxel_size_m));
 }
 
 void checkReading(const Findings& findings, Warnings& warnings) {
@@ -234,7 +234,9 @@ void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
   last_.T_world_ref = keyframe.T_world_ref;
   pixels_ += keyframe.map.pixels;
   if (!depths_m.empty()) {
-    parallaxes_px_.push_back(keyframe.parallax_px_m / upperMedian(depths_m));
+    const double middle_m = upperMedian(depths_m);
+    parallaxes_px_.push_back(keyframe.parallax_px_m / middle_m);
+    pixels_m_.push_back(middle_m / keyframe.view.fx);
   }
 }
 
@@ -300,14 +302,28 @@ std::vector<std::string> DepthStatistics::doubts() const {
   return doubts;
 }
 
-std::vector<Warning> DepthStatistics::warnings() const {
+std::vector<Warning> DepthStatistics::warnings(double voxel_size_m) const {
   // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: at most 2.4 % with
   // limits around the scene; 7 to 74 % in eight of ten cases with much of the scene beyond a limit.
   // The fraction is not larger because most pixels without a peak inside the limits are rejected.
   constexpr double kMaxFraction = 0.06;
   constexpr std::uint64_t kMinDepths = 100;  // fewer may be at a limit by chance
   constexpr int kMinPlanes = 50;             // with fewer, the limit's own plane has many depths
+  // HD at 1 m: 0.11. A car with 346 x 260 pixels at 20 m: 9.
+  constexpr double kMinPixel = 0.1;  // of a voxel
+  constexpr double kMaxPixel = 20;
   Warnings warnings;
+  std::vector<double> pixels_m = pixels_m_;
+  const double pixel_m = pixels_m.empty() ? voxel_size_m : upperMedian(pixels_m);
+  if (depths_ >= kMinDepths &&
+      (pixel_m < kMinPixel * voxel_size_m || pixel_m > kMaxPixel * voxel_size_m)) {
+    addWarning(warnings, "voxel-size",
+               "a pixel at the median depth is {:.1g} m wide, a voxel of the map {:g} m: {}; "
+               "--set map.voxel_size_m={:.1g} fits the scene (are the positions in metres?)",
+               pixel_m, voxel_size_m,
+               pixel_m < voxel_size_m ? "details are lost" : "points of one place are not merged",
+               pixel_m);
+  }
   if (depths_ < kMinDepths || planes_.num_planes < kMinPlanes) return warnings;
   const auto check = [&](std::uint64_t count, const char* which, double limit_m, const char* key) {
     const double fraction = static_cast<double>(count) / static_cast<double>(depths_);

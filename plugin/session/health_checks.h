@@ -48,7 +48,8 @@ class DepthStatistics {
       : planes_(planes), chosen_(std::move(chosen)) {}
 
   void add(const KeyframeDepthMap& keyframe);
-  std::vector<Warning> warnings() const;
+  /// @param voxel_size_m of the map: `voxel-size` if it does not fit the scene.
+  std::vector<Warning> warnings(double voxel_size_m) const;
   const PixelCounts& pixels() const { return pixels_; }
   /// Returns the reasons why the depths rest on little evidence; empty if there are none.
   std::vector<std::string> doubts() const;
@@ -63,6 +64,7 @@ class DepthStatistics {
   std::uint64_t shared_ = 0;           // points that two consecutive keyframes have
   std::uint64_t agreeing_ = 0;         // shared points with the same depth
   std::vector<double> parallaxes_px_;  // of each keyframe, at its median depth
+  std::vector<double> pixels_m_;       // size of a pixel there
   std::uint64_t depths_ = 0;
   std::uint64_t nearest_ = 0;   // depths near the nearest plane
   std::uint64_t farthest_ = 0;  // depths near the farthest plane
@@ -81,6 +83,7 @@ struct Findings {
   const SessionStatus* session = nullptr;
   const FusionMapperOptions* options = nullptr;
   const DepthStatistics* depths = nullptr;
+  double voxel_size_m = 0.01;  ///< Of the map.
 
   /// Takes the depth limits of a map.
   void use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);

@@ -97,7 +97,7 @@ def depth(
     ax : matplotlib.axes.Axes
         By default of a new figure.
     limits : (float, float)
-        Near and far end of the colours; by default the depths' 1 % and 99 %. The same limits make figures comparable.
+        Near and far end of the colours; by default the depths' 2nd and 98th percentile. The same limits make figures comparable.
 
     Raises
     ------
@@ -108,8 +108,8 @@ def depth(
     metres = _depths(keyframe)
     if limits is None:
         valid = metres[np.isfinite(metres)]
-        near, far = np.percentile(valid, [1, 99]) if valid.size else (1.0, 2.0)
-        limits = float(near), float(max(far, 1.001 * near))
+        near, far = np.percentile(valid, [2, 98]) if valid.size else (1.0, 2.0)
+        limits = float(near), float(max(far, 1.1 * near))
     if not 0 < limits[0] < limits[1]:
         raise ValueError(f"limits = {limits}: expected 0 < near < far, metres")
     _title(ax, keyframe)

@@ -4,6 +4,7 @@
 import glob
 import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -106,6 +107,16 @@ def test_a_keyframe_lies_on_the_points_of_the_map(made):
     # The map averages the points of a voxel of 2 cm.
     for p in p_world[:: len(p_world) // 50]:
         assert np.min(np.linalg.norm(points - p, axis=1)) < 0.04
+
+
+def test_keyframes_can_be_pickled(made):
+    keyframe = made.keyframes[0]
+    copy = pickle.loads(pickle.dumps(keyframe))
+    for name in ("t", "window"):
+        assert getattr(copy, name) == getattr(keyframe, name)
+    for name in ("depth", "confidence", "sigma", "pose", "K"):
+        np.testing.assert_array_equal(getattr(copy, name), getattr(keyframe, name), name)
+    np.testing.assert_array_equal(copy.points(), keyframe.points())
 
 
 def test_events_come_in_chunks_of_any_size(desk):

@@ -413,6 +413,15 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
     to.push_back({"pose-frame", text});
   };
   FrameTree::Way way;
+  if (camera.empty() && !body.empty() && !options.has_hand_eye && tree.hasBelow(body)) {
+    say(parts.warnings,
+        fmt::format(
+            "{}: the poses are those of the frame {}, but transforms join it to others, and "
+            "the events do not name their frame: if they are those of another one, give "
+            "--topics \"/tf:{}->CAMERA\", or --hand-eye FILE (T_body_rig, the pose of the "
+            "camera in {})",
+            poses.name, body, poses.frames.frame.empty() ? "WORLD" : poses.frames.frame, body));
+  }
   if (differ && poses.is_transform && poses.frames.frame == camera && !options.has_hand_eye) {
     // The camera sees a body that rests: the inverse is the camera's pose.
     for (StampedPose& pose : poses.chain[0]) pose.T_world_rig = pose.T_world_rig.inverse();
@@ -439,6 +448,9 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
   if (!way.empty() && parts.poses_damage.empty()) parts.poses_damage = tree.damage();
   std::uint64_t left_out;
   parts.poses = productOf(poses.chain, left_out);
+  if (parts.poses.empty()) {
+    throw std::runtime_error("the transforms of the chain have no time in common (one clock?)");
+  }
   if (left_out == 0) return;
   say(parts.notes,
       fmt::format("{}: {} poses are left out, as a transform begins later, ends earlier "

@@ -123,14 +123,13 @@ void FrameTree::extend(Way& way, const std::string& to, std::vector<Way>& found,
 }
 
 FrameTree::Way FrameTree::way(const std::string& from, const std::string& to) const {
-  if (transforms_.count({from, to}) + transforms_.count({to, from}) > 0) return {from, to};
   std::vector<Way> found;
   Way way = {from};
   int steps = 100'000;
   extend(way, to, found, steps);
   if (found.size() < 2) return found.empty() ? Way() : found.front();
   std::vector<std::string> ways;
-  for (const Way& each : found) ways.push_back(fmt::format("{}", fmt::join(each, kArrow)));
+  for (const Way& each : found) ways.push_back(fmt::format("\"/tf:{}\"", fmt::join(each, kArrow)));
   throw std::runtime_error(fmt::format("several ways from {} to {}: expected one of {}", from, to,
                                        fmt::join(ways, ", ")));
 }
@@ -143,7 +142,12 @@ FrameTree::Way FrameTree::wayThrough(const std::string& frames) const {
     if (frames.compare(begin, 1, "/") == 0) ++begin;  // as the frames of messages
     const std::string frame = frames.substr(begin, end - begin);
     begin = end + 2;
-    const Way next = all.empty() ? Way{frame} : way(all.back(), frame);
+    const bool direct =
+        !all.empty() &&
+        transforms_.count({all.back(), frame}) + transforms_.count({frame, all.back()}) > 0;
+    const Way next = all.empty() ? Way{frame}
+                     : direct    ? Way{all.back(), frame}  // the named one comes first
+                                 : way(all.back(), frame);
     if (next.empty()) break;
     all.insert(all.end(), next.begin() + (all.empty() ? 0 : 1), next.end());
     if (begin > frames.size() && all.size() > 1) return all;
@@ -178,7 +182,7 @@ FrameChain FrameTree::along(const Way& way) const {
   };
   if (!moving.empty()) read_(take);
   for (const auto& [pair, poses] : moving) {
-    requireOneTrajectory(poses, fmt::format("the transform {}->{}", pair.first, pair.second));
+    requireOneTrajectory(poses, fmt::format("the transform {}->{}", pair.first, pair.second), true);
   }
   FrameChain chain;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -39,11 +39,11 @@ class FrameTree {
   /// Returns all pairs of frames; those from the world to the camera come first.
   std::vector<RecordedTransform> transforms(const std::string& camera) const;
 
-  /// Returns the way between two frames: the transform of just these two, if there is one, else the
-  /// only chain of transforms. @return an empty one if nothing joins them.
+  /// Returns the only chain of transforms between two frames; an empty one if nothing joins them.
   /// @throws std::runtime_error listing the ways if there are several.
   Way way(const std::string& from, const std::string& to) const;
-  /// Returns the way through frames "world->odom->camera", each joined to the next as in `way`.
+  /// Returns the way through frames "world->odom->camera": each is joined to the next by the
+  /// transform of just these two, if there is one, else as in `way`.
   /// @throws std::runtime_error for unknown or unconnected frames; it lists all transforms.
   Way wayThrough(const std::string& frames) const;
   /// Returns the transforms along a way.
@@ -51,6 +51,11 @@ class FrameTree {
   /// two publishers of a moving one.
   FrameChain along(const Way& way) const;
 
+  /// Returns whether a transform gives the pose of another frame in this one.
+  bool hasBelow(const std::string& frame) const {
+    const auto found = transforms_.lower_bound({frame, {}});
+    return found != transforms_.end() && found->first.first == frame;
+  }
   /// Returns choices "world->camera" of poses that move: the frames above the camera's frame.
   /// @param camera if it is not in the tree: all frames without frames below them.
   std::vector<std::string> choices(const std::string& camera) const;

@@ -157,8 +157,8 @@ void Calibration::requireCameras(std::size_t count) const {
           ? ""
           : fmt::format(
                 "; `map --calibration {} --set rig.cameras={}` (Python: cameras=[{}]) takes "
-                "the camera {}",
-                file.string(), last, last, last)));
+                "the camera {} (or others of 0 to {})",
+                file.string(), last, last, last, own - 1)));
 }
 
 void Calibration::requireLike(const Rig& recorded) const {

@@ -165,7 +165,7 @@ std::optional<Path> onlyFileOf(const Path& folder, const Has& has, const char* o
   }
   std::sort(found.begin(), found.end());
   if (found.size() == 1) {
-    parts.warnings.push_back(
+    parts.notes.push_back(
         {"found-file", fmt::format("{}: taken, as the only one in the folder ({})",
                                    found.front().string(), option)});
     return found.front();

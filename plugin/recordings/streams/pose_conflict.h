@@ -22,11 +22,13 @@ struct PoseConflict : TrajectoryConflict {  // `first` and `second`: in the orde
 };
 
 /// Finds a conflict as `TrajectoryCheck` does, over all poses and where the times go back.
-/// @param poses in the order of the file.
-std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& poses);
+/// @param poses in the order of the file. @param takes_lost see `TrajectoryCheck`.
+std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& poses,
+                                             bool takes_lost = false);
 
 /// @throws std::runtime_error with a conflict of the poses, whose places are their times.
 /// @param name name of the poses, for the error.
-void requireOneTrajectory(const std::vector<StampedPose>& poses, const std::string& name);
+void requireOneTrajectory(const std::vector<StampedPose>& poses, const std::string& name,
+                          bool takes_lost = false);
 
 }  // namespace efm

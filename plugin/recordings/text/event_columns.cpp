@@ -294,7 +294,9 @@ char eventColumnOf(const HeaderWord& word) {
       {'y',
        " y ys v row y_pos pos_y ypos posy y_px px_y pixel_y y_pixel y_coord coord_y "
        "y_coordinate y_addr "},
-      {'c', " camera camera_id cam cam_id camid cameraid camera_index sensor sensor_id "},
+      {'c',
+       " camera camera_id camera_name camera_index cameraid cam cam_id cam_index camid sensor "
+       "sensor_id device device_id "},
       {'p', " p ps pol pols polarity polarities on on_off sign "}};
   if (word.isTime()) return 't';
   for (const auto& [column, names] : kNames) {

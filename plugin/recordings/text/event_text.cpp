@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cctype>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -409,13 +411,19 @@ std::string EventTextStream::commandInOrder() const {
 
 std::string EventTextStream::commandOfCamera() const {
   const std::size_t column = columns_.order.find('c') + 1;
+  const auto isPlain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
+  };
+  std::string camera;  // quotes, blanks and CR are hard to write in a command
+  std::copy_if(cameras_[camera_].begin(), cameras_[camera_].end(), std::back_inserter(camera),
+               isPlain);
+  const bool plain = content_.seekableBytes() > 0;
   return fmt::format(
-      "{} has the events of several cameras in column {}; one alone: {}awk{} 'NR <= {} || ${} == "
-      "\"{}\"'{} >NEW",
-      name(), column, content_.seekableBytes() > 0 ? "" : "zcat FILE | ",
-      columns_.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.separator),
-      columns_.header_lines, column, cameras_[camera_],
-      content_.seekableBytes() > 0 ? " FILE" : "");
+      "{} has the events of several cameras in column {}; one alone: {}awk{} '{{c = ${}; "
+      "gsub(/[^a-zA-Z0-9._-]/, \"\", c)}} NR <= {} || c == \"{}\"'{} >NEW",
+      name(), column, plain ? "" : "zcat FILE | ",
+      columns_.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.separator), column,
+      columns_.header_lines, camera, plain ? " FILE" : "");
 }
 
 std::string EventTextStream::place(std::uint64_t line) const {

@@ -72,6 +72,12 @@ struct PoseColumns {
   }
 };
 
+/// Returns the beginning of an awk command for lines like this one.
+std::string awkFor(std::string_view line) {
+  const char* const separator = line.find(',') != line.npos ? " -F," : "";
+  return std::string("awk") + (line.find(';') != line.npos ? " -F';'" : separator);
+}
+
 /// Returns the columns that a header names; std::nullopt if the line is no header.
 std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
   std::vector<std::string_view> words = poseFields(line);
@@ -86,8 +92,18 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
   for (const std::string_view text : words) {
     const HeaderWord word = headerWord(text);
     if (word.name.empty()) {
-      if (field) columns.setUnit(*field, word);
+      if (text.empty()) ++columns.count;  // the index of pandas has no name
+      if (field && !text.empty()) columns.setUnit(*field, word);
       continue;
+    }
+    const bool in_ns = word.isTime() && word.time_exponent == -9 && columns.time_exponent == 0;
+    if (found[0] && (in_ns || word.name.rfind("nanosec", 0) == 0)) {
+      throw std::runtime_error(fmt::format(
+          "{}: seconds and nanoseconds in two columns: expected one time ({} -v OFS=, 'NR == 1 "
+          "{{${ns} = \"unused\"}} NR > 1 {{${s} = sprintf(\"%d.%09d\", ${s}, ${ns})}} 1' FILE "
+          ">NEW)",
+          inQuotes(line), awkFor(line), fmt::arg("s", columns.column[0] + 1),
+          fmt::arg("ns", columns.count + 1)));
     }
     field = poseFieldOf(word);
     angles = angles || startsWithAny(word.name, {"roll", "pitch", "yaw", "euler"});
@@ -147,12 +163,6 @@ std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
     }
   }
   return lines;
-}
-
-/// Returns the beginning of an awk command for lines like this one.
-std::string awkFor(std::string_view line) {
-  const char* const separator = line.find(',') != line.npos ? " -F," : "";
-  return std::string("awk") + (line.find(';') != line.npos ? " -F';'" : separator);
 }
 
 /// Finds the exponent of the unit of times. @param columns may have the unit of the header.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <stdexcept>
 
 namespace efm {
@@ -48,6 +49,30 @@ cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
 /// Returns the axis of depths between two limits: linear in inverse depth.
 AxisRange depthAxis(const DepthPlanesOptions& limits) {
   return {limits.min_depth_m, limits.max_depth_m, AxisScale::kInverse};
+}
+
+/// Returns limits for colours: most depths lie in a part of the planes' limits, and the colours of
+/// the other part would be lost. At least a factor of 1.1 apart, so that a wall is not all colours.
+DepthPlanesOptions colourLimits(const std::vector<const cv::Mat1f*>& maps,
+                                DepthPlanesOptions limits) {
+  constexpr double kOutside = 0.02;  // fraction of the depths on each side
+  constexpr double kMinRatio = 1.1;
+  std::vector<float> depths_m;
+  for (const cv::Mat1f* map : maps) {
+    std::copy_if(map->begin(), map->end(), std::back_inserter(depths_m),
+                 [](float depth_m) { return depth_m > 0; });
+  }
+  if (depths_m.empty()) return limits;
+  const auto at = [&](double fraction) {
+    const auto i = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(depths_m.size() - 1));
+    std::nth_element(depths_m.begin(), depths_m.begin() + i, depths_m.end());
+    return static_cast<double>(depths_m[static_cast<std::size_t>(i)]);
+  };
+  const double near_m = at(kOutside), far_m = at(1 - kOutside);
+  const double widening = std::sqrt(std::max(1.0, kMinRatio * near_m / far_m));
+  limits.min_depth_m = near_m / widening;
+  limits.max_depth_m = far_m * widening;
+  return limits;
 }
 
 }  // namespace
@@ -165,9 +190,9 @@ cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width) {
   return small;
 }
 
-cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
-  return drawValues({"", map.depth, depthAxis(limits), "m", Palette::kBrightToDark, kMinFigureWidth,
-                     lightGrey(map.confidence)});
+cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& planes) {
+  return drawValues({"", map.depth, depthAxis(colourLimits({&map.depth}, planes)), "m",
+                     Palette::kBrightToDark, kMinFigureWidth, lightGrey(map.confidence)});
 }
 
 cv::Mat1b confidenceFigure(const cv::Mat1f& confidence) {
@@ -238,8 +263,11 @@ void KeyframeSheet::add(std::int64_t t_ref_ns, const cv::Mat1f& depth_m) {
   kept_.push_back({t_ref_ns, reducedDepth(depth_m, kMaxWidth).clone()});
 }
 
-cv::Mat3b KeyframeSheet::draw(const DepthPlanesOptions& limits) const {
+cv::Mat3b KeyframeSheet::draw(const DepthPlanesOptions& planes) const {
   if (kept_.empty()) throw std::logic_error("a sheet needs a keyframe");
+  std::vector<const cv::Mat1f*> maps;
+  for (const Kept& kept : kept_) maps.push_back(&kept.depth_m);
+  const DepthPlanesOptions limits = colourLimits(maps, planes);
   const std::size_t shown = std::min(kMaxShown, kept_.size());
   const auto columns =
       static_cast<std::size_t>(std::lround(std::sqrt(4.0 / 3.0 * static_cast<double>(shown))));

@@ -44,8 +44,10 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
 cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width);
 
 /// Draws a depth map for a paper: perceptual colours, the confidence in light grey under the
-/// depths, a colour bar in metres. Images of small sensors are enlarged by a whole factor.
-cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits);
+/// depths, a colour bar in metres. The colours reach from the 2nd to the 98th percentile of the
+/// depths. Images of small sensors are enlarged by a whole factor.
+/// @param planes limits for a map without depths.
+cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& planes);
 /// Draws a confidence map in grey levels in the same layout; the map's maximum is black.
 cv::Mat1b confidenceFigure(const cv::Mat1f& confidence);
 
@@ -71,9 +73,9 @@ class KeyframeSheet {
   void add(std::int64_t t_ref_ns, const cv::Mat1f& depth_m);
 
   /// Draws up to `kMaxShown` depth maps with their times in seconds, and one colour bar in metres.
-  /// @param limits depth limits of the colours.
+  /// The colours are those of `depthFigure`, for all depth maps.
   /// @throws std::logic_error if there is no keyframe.
-  cv::Mat3b draw(const DepthPlanesOptions& limits) const;
+  cv::Mat3b draw(const DepthPlanesOptions& planes) const;
 
  private:
   struct Kept {

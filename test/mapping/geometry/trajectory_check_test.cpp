@@ -46,11 +46,11 @@ std::optional<TrajectoryConflict> conflictOf(const std::vector<StampedPose>& pos
 
 TEST(TrajectoryCheck, FindsASecondBodyOfAnyRate) {
   for (const double rate_hz : {10.0, 30.0, 200.0, 1000.0}) {
-    for (const double part : {1.0, 0.5, 0.1}) {                  // of the rate
+    for (const double part : {1.0, 0.5, 0.1, 0.02}) {            // of the rate
       for (const double first_s : {0.0, 3e-5, 0.4 / rate_hz}) {  // after the first body
         for (const double apart_m : {0.2, 1.0, 20.0}) {
           // Between two poses of a body it moves by up to a quarter of the distance.
-          if (rate_hz * part < 5 || apart_m < 3 / (rate_hz * part)) continue;
+          if (rate_hz * part < 5 || apart_m < 9 / (rate_hz * part)) continue;
           // Between two bodies at these times there may be a motion.
           if (2 * apart_m < 400 * first_s * first_s) continue;
           const auto second = posesAt(rate_hz * part, first_s, {0, 0, apart_m});
@@ -97,6 +97,26 @@ TEST(TrajectoryCheck, TakesTheFaultsOfATrackerForOneBody) {
            pose.T_world_rig.translation =
                (100 * pose.T_world_rig.translation).array().round() / 100;
          }},
+        {"single outliers at 10 %",
+         [&](std::size_t i, StampedPose& pose) {
+           if (i % 10 == 5) pose.T_world_rig.translation += some();
+         }},
+        {"single identities at 10 %",
+         [](std::size_t i, StampedPose& pose) {
+           if (i % 10 == 5) pose.T_world_rig = {};
+         }},
+        {"single places of a lost tracker at 10 %",
+         [](std::size_t i, StampedPose& pose) {
+           if (i % 10 < 1) pose.T_world_rig = {{0.8, 0.6, 0, 0}, {1, 2, 3}};
+         }},
+        {"noise of 10 cm without rotation",
+         [&](std::size_t, StampedPose& pose) {
+           pose.T_world_rig = {{1, 0, 0, 0}, {0.1 * some()}};
+         }},
+        {"noise of 0.6 degrees of a rig at rest",
+         [&](std::size_t, StampedPose& pose) {
+           pose.T_world_rig = {rotationBy(0.01 * some()), 0.001 * some()};
+         }},
         {"outliers in bursts of ten",
          [&](std::size_t i, StampedPose& pose) {
            if (i % 100 < 10) pose.T_world_rig.translation += some();
@@ -113,6 +133,14 @@ TEST(TrajectoryCheck, TakesTheFaultsOfATrackerForOneBody) {
          [](std::size_t, StampedPose& pose) {
            const double t_s = 1e-9 * static_cast<double>(pose.t_ns);
            pose.T_world_rig.translation.y() += 0.05 * std::sin(50 * t_s);
+         }},
+        {"shaken at 15 Hz, well sampled",
+         [&](std::size_t, StampedPose& pose) {
+           const double phase = 94e-9 * static_cast<double>(pose.t_ns);
+           if (rate_hz < 60) return;
+           pose.T_world_rig.translation.y() += 0.01 * std::sin(phase);
+           pose.T_world_rig.rotation =
+               pose.T_world_rig.rotation * rotationBy({0, 0, 0.05 * std::sin(phase)});
          }},
         {"times that repeat",
          [&](std::size_t i, StampedPose& pose) {

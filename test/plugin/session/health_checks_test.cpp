@@ -387,6 +387,7 @@ TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
 TEST(HealthChecks, DepthsAtALimitAreSeen) {
   DepthPlanesOptions planes;  // 0.5 to 5 m: inverse depths of 2 to 0.2 per metre
   std::vector<ChosenOption> chosen;
+  double voxel_m = 0.01;  // as a pixel at 1 m
   const auto warningsAt = [&](float depth_m, int percent, int depths = 500) {
     cv::Mat_<float> depth(20, 50, 0.0F);
     for (int i = 0; i < depths; ++i) {
@@ -395,8 +396,9 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
     DepthStatistics statistics(planes, chosen);
     KeyframeDepthMap keyframe;
     keyframe.map.depth = depth;
+    keyframe.view.fx = 100;
     statistics.add(keyframe);
-    return statistics.warnings();
+    return statistics.warnings(voxel_m);
   };
   EXPECT_THAT(warningsAt(0.508F, 10).at(0).text,
               AllOf(HasSubstr("10 % of the depths lie at the nearest plane"), HasSubstr("0.5 m")));
@@ -413,6 +415,15 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
   EXPECT_THAT(warningsAt(0.508F, 10).at(0).text, HasSubstr("beyond it ([dsi] min_depth_m)"));
   planes.num_planes = 40;
   EXPECT_THAT(warningsAt(0.508F, 10), IsEmpty());
+  for (const auto& [size_m, warns] : {std::pair(0.00051, false), std::pair(0.00049, true),
+                                      std::pair(0.099, false), std::pair(0.101, true)}) {
+    voxel_m = size_m;
+    const std::vector<Warning> warnings = warningsAt(1, 100);
+    ASSERT_EQ(warnings.size(), warns ? 1U : 0U) << size_m;
+    if (!warns) continue;
+    EXPECT_EQ(warnings[0].name, "voxel-size");
+    EXPECT_THAT(warnings[0].text, HasSubstr("--set map.voxel_size_m=0.01 fits the scene"));
+  }
 }
 
 TEST(HealthChecks, DepthsThatRestOnLittleEvidenceAreDoubted) {

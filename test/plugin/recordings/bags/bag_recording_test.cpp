@@ -527,6 +527,18 @@ TEST_F(BagRecording, ChainsOfTransformsEndInTheFrameOfTheEvents) {
                                               HasSubstr("--hand-eye FILE")));
     EXPECT_THAT(opened(other, {}, true).warnings, IsEmpty());
 
+    RobotBag nameless(bytesOf(container));  // events of an old driver
+    for (RecordedMessage& message : nameless.messages) {
+      if (message.type != kArray) continue;
+      message.data = eventArray(bytesOf(container), someEvents(message.log_ns, kMsNs, 5), "");
+    }
+    nameless.odometry("base");
+    parts = opened(nameless);
+    ASSERT_EQ(parts.warnings.size(), 1U);
+    EXPECT_THAT(parts.warnings[0].text,
+                AllOf(HasSubstr("do not name their frame"), HasSubstr("/tf:odom->CAMERA")));
+    expectPoses(opened(nameless, {"/tf:odom->cam"}), 0, RobotBag::kPoses, T_odom_cam, "named");
+
     RobotBag seen(bytesOf(container));  // a tag that the camera sees, and the camera's own poses
     for (int i = 0; i < RobotBag::kPoses; ++i) {
       const std::int64_t t_ns = RobotBag::odomNs(i);
@@ -567,7 +579,7 @@ TEST_F(BagRecording, TransformsThatContradictEachOtherAreErrors) {
   }
   ways.transform("/tf_static", kStartNs, "map", "gps", {});
   const std::string error = errorOfBag(ways, {"/tf:map->cam"});
-  EXPECT_THAT(error, HasSubstr("several ways from map to cam: expected one of"));
+  EXPECT_THAT(error, HasSubstr("several ways from map to cam: expected one of \"/tf:map->"));
   for (const char* way : {"map->gps->base->mast->cam", "map->odom->base->mast->cam"}) {
     EXPECT_THAT(error, HasSubstr(way));
     EXPECT_EQ(errorOfBag(ways, {std::string("/tf:") + way}), "no error")
@@ -578,6 +590,21 @@ TEST_F(BagRecording, TransformsThatContradictEachOtherAreErrors) {
   const RecordingParts named =
       open({write("bag", Container::kMcap, together(ways.messages, {}))}, {"/tf:map->base"});
   EXPECT_EQ(named.poses.size(), 2U) << "the transform of just these two frames";
+  RobotBag direct = robot;  // nobody named the direct way from the base to the camera
+  direct.transform("/tf_static", kStartNs, "base", "cam", {});
+  EXPECT_THAT(errorOfBag(direct, {"/tf:map->base"}), HasSubstr("several ways from base to cam"));
+  EXPECT_EQ(errorOfBag(direct, {"/tf:map->base->cam"}), "no error");
+  RobotBag early = robot;
+  for (RecordedMessage& message : early.messages) {
+    if (message.topic == "/tf" && message.data.find("map") != std::string::npos)
+      message.data.clear();
+  }
+  early.messages.erase(std::remove_if(early.messages.begin(), early.messages.end(),
+                                      [](const auto& message) { return message.data.empty(); }),
+                       early.messages.end());
+  early.transform("/tf", 5 * kMsNs, "map", "odom", {});
+  early.transform("/tf", 9 * kMsNs, "map", "odom", {{1, 0, 0, 0}, {1, 0, 0}});
+  EXPECT_THAT(errorOfBag(early, {"/tf:map->base"}), HasSubstr("have no time in common"));
   RobotBag bodies = robot;
   bodies.odometry("base");
   bodies.pose("/odom", kOdometry, kStartNs + 7 * kMsNs, "odom", "other", {});

@@ -83,7 +83,7 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
   recorded.cameras.pop_back();
   EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }),
               AllOf(HasSubstr("given.txt: 2 cameras: expected 1, as the recording has; `map "),
-                    EndsWith("--set rig.cameras=1` (Python: cameras=[1]) takes the camera 1")));
+                    EndsWith("--set rig.cameras=1` (Python: cameras=[1]) takes the camera 1 (or others of 0 to 1)")));
   EXPECT_THAT(messageOf([&] { calibration.camera(2, std::nullopt); }),
               HasSubstr("given.txt: 2 cameras, but the recording has camera 2: expected one"));
 }

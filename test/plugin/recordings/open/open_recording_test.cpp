@@ -116,7 +116,8 @@ Opened openedOf(const RecordingSource& source) {
     if (events != nullptr) opened.width = events->calibration.model.width;
     if (events == nullptr) ++opened.poses;
   }
-  for (const Warning& warning : recording->counts().warnings) {
+  EXPECT_THAT(recording->counts().warnings, testing::IsEmpty());
+  for (const Warning& warning : recording->counts().notes) {
     opened.warnings.push_back(warning.name + ": " + warning.text);
   }
   return opened;

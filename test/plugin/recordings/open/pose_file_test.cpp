@@ -234,13 +234,14 @@ TEST_F(PoseFile, OneFileHasOneTrajectoryAndAnErrorTellsHowToTakeIt) {
     for (int i = 0; i < count; ++i) text += poseLine(first_s + 0.01 * i, y);
     return text;
   };
-  std::string alternating, sparse, equal, csv = "name,t,x,y,z,qx,qy,qz,qw\n", few, turned;
+  std::string alternating, sparse, equal, csv = "name,t,x,y,z,qx,qy,qz,qw\n", few, turned, lost;
   for (int i = 0; i < 300; ++i) {
     const double t_s = 5 + 0.01 * i;
     alternating += poseLine(t_s, 0) + poseLine(t_s + 30e-6, 1);
-    sparse += poseLine(t_s, 0) + (i % 10 == 5 ? poseLine(t_s + 0.004, -0.3) : "");
+    sparse += poseLine(t_s, 0) + (i % 10 == 5 ? poseLine(t_s + 0.004, -0.6) : "");
     equal += poseLine(t_s, 0) + poseLine(t_s, 0.002);
     csv += "1," + poseLine(t_s, 0, ",") + "2," + poseLine(t_s + 0.005, 2, ",");
+    lost += i % 12 == 0 ? fmt::format("{:.6f} 0 0 0 0 0 0 1\n", t_s) : poseLine(t_s, 0);
     few += poseLine(t_s, 0) + (i % 150 == 5 ? poseLine(t_s, 1) : "");
     turned += poseLine(t_s, 0) + fmt::format("{:.6f} {:.4f} 0 0.5 0 0.6 0 0.8\n", t_s + 0.004, t_s);
   }
@@ -260,6 +261,7 @@ TEST_F(PoseFile, OneFileHasOneTrajectoryAndAnErrorTellsHowToTakeIt) {
       {"a clock that was set back by 0.2 s", lines(3000, 5, 0) + lines(3000, 34.8, 0.2),
        "the times go back at line 3001", "0.2"},
       {"few equal times", few, nullptr, ""},
+      {"lost now and then", lost, nullptr, ""},
       {"two parts in another order", lines(300, 8, 0) + lines(300, 5, 0), nullptr, ""},
       {"one body twice", lines(300, 5, 0) + lines(300, 5, 0.0005), nullptr, ""},
   };
