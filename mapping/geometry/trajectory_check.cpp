@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/geometry/trajectory_check.h"
 
+#include <algorithm>
+
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -27,17 +29,16 @@ void count(const StampedPose& a, std::size_t first, const StampedPose& b, std::s
   conflict.angle_rad = angleBetween(a, b);
 }
 
-/// Returns whether three poses need an acceleration over 400 m/s² and rad/s², 40 g.
-bool isViolent(const StampedPose& a, const StampedPose& b, const StampedPose& c) {
-  constexpr double kMaxAcceleration = 400;
+/// Returns the acceleration that three poses need; 1 is what no rig has: 600 m/s² or 2000 rad/s².
+double violenceOf(const StampedPose& a, const StampedPose& b, const StampedPose& c) {
   const auto motion = [](const StampedPose& from, const StampedPose& to) {
     return differenceOf(from.T_world_rig.inverse() * to.T_world_rig);
   };
   const double before_s = secondsBetween(a.t_ns, b.t_ns);
   const double after_s = secondsBetween(b.t_ns, c.t_ns);
   const Vector6d change = motion(b, c) * before_s - motion(a, b) * after_s;
-  return change.head<3>().norm() + change.tail<3>().norm() >
-         kMaxAcceleration * before_s * after_s * (before_s + after_s) / 2;
+  const double per_unit = std::max(before_s * after_s * (before_s + after_s) / 2, 1e-18);
+  return std::max(change.head<3>().norm() / 600, change.tail<3>().norm() / 2000) / per_unit;
 }
 
 }  // namespace
@@ -91,13 +92,15 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
   const StampedPose& before = last_.back();
   const double distance = distanceBetween(before, pose);
   if (distance < kMinDistance || last_.size() < 2) return;
-  if (!isViolent(last_[last_.size() - 2], before, pose)) return;
-  if (2 * distance * static_cast<double>(changes_.count) > sum_) ++leaps_;  // not a usual step
+  const double violence = violenceOf(last_[last_.size() - 2], before, pose);
+  if (violence < 0.5) return;                  // half: before the leap, the motion was usual
+  if (4 * distance >= last_change_) ++leaps_;  // a shorter one is a usual motion
+  if (violence < 1) return;
   for (std::size_t i = last_.size() - 1; i-- > 0;) {
     const StampedPose& earlier = last_[i];
     if (pose.t_ns - earlier.t_ns > kMaxTimeNs) return;
     if (distanceBetween(earlier, pose) < distance / 4) {
-      sum_ += distance;
+      last_change_ = distance;
       return count(before, numbers_.back(), pose, changes_.of, changes_);
     }
     // Farther back than the places of several bodies, there are only poses of the place before.
@@ -108,8 +111,8 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
 std::optional<TrajectoryConflict> TrajectoryCheck::conflict() const {
   constexpr std::uint64_t kMinChanges = 8;
   if (100 * equal_times_.count > equal_times_.of) return equal_times_;
-  if (changes_.count >= kMinChanges && 200 * changes_.count > 3 * changes_.of &&
-      10 * changes_.count > 6 * leaps_) {
+  if (changes_.count >= kMinChanges && 20 * changes_.count > changes_.of &&
+      3 * changes_.count > 2 * leaps_) {
     return changes_;
   }
   return std::nullopt;

@@ -28,12 +28,12 @@ struct TrajectoryConflict {
 ///
 /// Two places alternate if a pose leaps from the place of the pose before it to the place of an
 /// earlier pose. A leap is at least 2 cm or 1.1 degrees, over four times as long as the motion at
-/// the place, and needs an acceleration over 400 m/s². Of the leaps of noise and of a shaken
-/// camera, few end at an earlier place; of those to single outliers and back, each second one does.
-/// At least 8 changes, 1.5 % of the poses and 60 % of the leaps are a conflict. So up to eight
-/// bodies are found, and one that has a pose for each 100 of another one. Poses that repeat an
-/// earlier one bit for bit, and the identity, may be those of a tracker that is lost: they can be
-/// left out.
+/// the place, and needs an acceleration over 600 m/s² or 2000 rad/s². Of the leaps of noise and of
+/// a shaken camera, few end at an earlier place; of those to single outliers and back, each second
+/// one does. At least 8 changes, 5 % of the poses and two thirds of the leaps are a conflict. So up
+/// to eight bodies are found, and one that has a pose for each 30 of another one. Poses that repeat
+/// an earlier one bit for bit, and the identity, may be those of a tracker that is lost: they can
+/// be left out.
 class TrajectoryCheck {
  public:
   /// @param takes_lost true if poses as of a lost tracker count: a transform has two publishers.
@@ -55,7 +55,7 @@ class TrajectoryCheck {
   std::deque<StampedPose> last_;     // the newest poses, the newest last
   std::deque<std::size_t> numbers_;  // of these poses
   Rigid3 lost_;                      // the pose of a lost tracker
-  double sum_ = 0;                   // of the distances of the changes
+  double last_change_ = 0;           // its distance
   std::uint64_t leaps_ = 0;
   StampedPose of_time_;  // the first pose of the newest time
   std::size_t of_time_number_ = 0;

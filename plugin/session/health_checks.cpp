@@ -141,7 +141,11 @@ void checkParts(const Findings& findings, Warnings& warnings) {
 }
 
 void checkDepths(const Findings& findings, Warnings& warnings) {
-  if (findings.depths) append(warnings, findings.depths->warnings(findings.voxel_size_m));
+  const bool wrong_pixels =
+      std::any_of(warnings.begin(), warnings.end(),
+                  [](const Warning& warning) { return warning.name == "focal-length"; });
+  const auto voxel_m = wrong_pixels ? std::nullopt : std::optional(findings.voxel_size_m);
+  if (findings.depths) append(warnings, findings.depths->warnings(voxel_m));
 }
 
 void checkReading(const Findings& findings, Warnings& warnings) {
@@ -302,7 +306,7 @@ std::vector<std::string> DepthStatistics::doubts() const {
   return doubts;
 }
 
-std::vector<Warning> DepthStatistics::warnings(double voxel_size_m) const {
+std::vector<Warning> DepthStatistics::warnings(std::optional<double> voxel_size_m) const {
   // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: at most 2.4 % with
   // limits around the scene; 7 to 74 % in eight of ten cases with much of the scene beyond a limit.
   // The fraction is not larger because most pixels without a peak inside the limits are rejected.
@@ -314,14 +318,15 @@ std::vector<Warning> DepthStatistics::warnings(double voxel_size_m) const {
   constexpr double kMaxPixel = 20;
   Warnings warnings;
   std::vector<double> pixels_m = pixels_m_;
-  const double pixel_m = pixels_m.empty() ? voxel_size_m : upperMedian(pixels_m);
-  if (depths_ >= kMinDepths &&
-      (pixel_m < kMinPixel * voxel_size_m || pixel_m > kMaxPixel * voxel_size_m)) {
+  const double voxel_m = voxel_size_m.value_or(0);
+  const double pixel_m = pixels_m.empty() ? voxel_m : upperMedian(pixels_m);
+  if (depths_ >= kMinDepths && voxel_size_m &&
+      (pixel_m < kMinPixel * voxel_m || pixel_m > kMaxPixel * voxel_m)) {
     addWarning(warnings, "voxel-size",
                "a pixel at the median depth is {:.1g} m wide, a voxel of the map {:g} m: {}; "
                "--set map.voxel_size_m={:.1g} fits the scene (are the positions in metres?)",
-               pixel_m, voxel_size_m,
-               pixel_m < voxel_size_m ? "details are lost" : "points of one place are not merged",
+               pixel_m, voxel_m,
+               pixel_m < voxel_m ? "details are lost" : "points of one place are not merged",
                pixel_m);
   }
   if (depths_ < kMinDepths || planes_.num_planes < kMinPlanes) return warnings;

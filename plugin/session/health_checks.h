@@ -48,8 +48,9 @@ class DepthStatistics {
       : planes_(planes), chosen_(std::move(chosen)) {}
 
   void add(const KeyframeDepthMap& keyframe);
-  /// @param voxel_size_m of the map: `voxel-size` if it does not fit the scene.
-  std::vector<Warning> warnings(double voxel_size_m) const;
+  /// @param voxel_size_m of the map: `voxel-size` if it does not fit the scene. Not given: no
+  /// check.
+  std::vector<Warning> warnings(std::optional<double> voxel_size_m) const;
   const PixelCounts& pixels() const { return pixels_; }
   /// Returns the reasons why the depths rest on little evidence; empty if there are none.
   std::vector<std::string> doubts() const;
