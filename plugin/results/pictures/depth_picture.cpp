@@ -63,12 +63,13 @@ DepthPlanesOptions colourLimits(const std::vector<const cv::Mat1f*>& maps,
                  [](float depth_m) { return depth_m > 0; });
   }
   if (depths_m.empty()) return limits;
-  const auto at = [&](double fraction) {
-    const auto i = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(depths_m.size() - 1));
-    std::nth_element(depths_m.begin(), depths_m.begin() + i, depths_m.end());
-    return static_cast<double>(depths_m[static_cast<std::size_t>(i)]);
-  };
-  const double near_m = at(kOutside), far_m = at(1 - kOutside);
+  const auto outside = static_cast<std::ptrdiff_t>(kOutside * static_cast<double>(depths_m.size()));
+  const auto near = depths_m.begin() + outside;
+  const auto far = depths_m.end() - 1 - outside;
+  std::nth_element(depths_m.begin(), near, depths_m.end());
+  const double near_m = *near;
+  std::nth_element(depths_m.begin(), far, depths_m.end());
+  const double far_m = *far;
   const double widening = std::sqrt(std::max(1.0, kMinRatio * near_m / far_m));
   limits.min_depth_m = near_m / widening;
   limits.max_depth_m = far_m * widening;

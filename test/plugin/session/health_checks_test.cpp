@@ -558,7 +558,12 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
       {blurred(1, 3, 1.2, 0),
        "poses-blur: the poses blur the events by 1.2 pixels within a window: with one camera this "
        "cannot be corrected, because wrong depths explain a wrong motion"},
-      {[](auto& s, auto&) { s.scene_unknown = true; }, "no-scene: "},
+      {[](auto& s, auto&) {
+         s.scene_unknown = true;
+         s.events = s.poses = TimeSpan{0, 1};
+       },
+       "no-scene: "},
+      {[](auto& s, auto&) { s.scene_unknown = true; }, ""},  // there is no input
       {live([](auto&) {}), ""},
       {live([](auto& s) {
          QueueCounts& camera = s.live->cameras[1];

@@ -275,12 +275,12 @@ yyyyyyyrrrrrrrr
 yyyyyyyrrrrrrrr
 rrrrrrrmmmmmmmm
 rrrrrrrmmmmmmmm
-rrrrrrrmmmmmmmm
+rrrrmmmmmmmmmmm
 mmmmmmmbbbbbbbb
 mmmmmmmbbbbbbbb
 mmmmmmmbbbbbbbb
     yrrmmmb
-1182682 px at 731.1, 438.2
+1182678 px at 731.1, 438.2
 )");
   EXPECT_EQ(cv::countNonZero(first != 1), 0) << "the caller's depth map is as it was";
 }
