@@ -49,11 +49,8 @@ void TrajectoryCheck::add(const StampedPose& pose) {
   if (takes_lost_ || !isLost(pose)) {
     if (!last_.empty()) lookForChange(pose);
     last_.push_back(pose);
-    numbers_.push_back(changes_.of);
-    if (last_.size() > kLastPoses) {
-      last_.pop_front();
-      numbers_.pop_front();
-    }
+    last_number_ = changes_.of;
+    if (last_.size() > kLastPoses) last_.pop_front();
   }
   ++changes_.of;
 }
@@ -101,7 +98,7 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
     if (pose.t_ns - earlier.t_ns > kMaxTimeNs) return;
     if (distanceBetween(earlier, pose) < distance / 4) {
       last_change_ = distance;
-      return count(before, numbers_.back(), pose, changes_.of, changes_);
+      return count(before, last_number_, pose, changes_.of, changes_);
     }
     // Farther back than the places of several bodies, there are only poses of the place before.
     if (i + kMaxBodies < last_.size() && distanceBetween(earlier, before) > distance / 2) return;

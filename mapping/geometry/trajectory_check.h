@@ -52,10 +52,10 @@ class TrajectoryCheck {
   bool isLost(const StampedPose& pose);
 
   bool takes_lost_;
-  std::deque<StampedPose> last_;     // the newest poses, the newest last
-  std::deque<std::size_t> numbers_;  // of these poses
-  Rigid3 lost_;                      // the pose of a lost tracker
-  double last_change_ = 0;           // its distance
+  std::deque<StampedPose> last_;  // the newest poses, the newest last
+  std::size_t last_number_ = 0;   // of the newest of them
+  Rigid3 lost_;                   // the pose of a lost tracker
+  double last_change_ = 0;        // its distance
   std::uint64_t leaps_ = 0;
   StampedPose of_time_;  // the first pose of the newest time
   std::size_t of_time_number_ = 0;

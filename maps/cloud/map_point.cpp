@@ -13,7 +13,7 @@ namespace {
 /// See `coarseStepOf`.
 /// @param position_of p_world of a point.
 template <typename Points, typename Position>
-std::optional<double> coarseStepAt(const Points& points, Position position_of,
+std::optional<double> coarseStepIn(const Points& points, Position position_of,
                                    double resolution_m) {
   if (points.empty()) return std::nullopt;
   std::vector<double> reaches;  // the largest coordinate of each point
@@ -21,16 +21,13 @@ std::optional<double> coarseStepAt(const Points& points, Position position_of,
   for (const auto& point : points) reaches.push_back(position_of(point).cwiseAbs().maxCoeff());
   const auto at = reaches.end() - 1 - static_cast<std::ptrdiff_t>(reaches.size() / 1000);
   std::nth_element(reaches.begin(), at, reaches.end());
-  const auto rounded = static_cast<float>(*at);
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const auto step_m = static_cast<double>(std::nextafter(rounded, kInfinity) - rounded);
-  return step_m > 0.1 * resolution_m ? std::optional(step_m) : std::nullopt;
+  return coarseStepAt(*at, resolution_m);
 }
 
 /// Returns the origin of a cloud's points.
 Eigen::Vector3d originOf(const std::vector<CloudPoint>& points, double resolution_m) {
   const auto position_of = [](const CloudPoint& point) { return point.p_world; };
-  if (!coarseStepAt(points, position_of, resolution_m)) return Eigen::Vector3d::Zero();
+  if (!coarseStepIn(points, position_of, resolution_m)) return Eigen::Vector3d::Zero();
   // The step of floats from x to 2 x is at most x / 2^23.
   const double unit_m = std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))));
   return (medianPosition(points) / unit_m).array().round() * unit_m;
@@ -54,9 +51,16 @@ MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolutio
   return cloud;
 }
 
+std::optional<double> coarseStepAt(double coordinate_m, double resolution_m) {
+  const auto rounded = static_cast<float>(coordinate_m);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const auto step_m = static_cast<double>(std::nextafter(rounded, kInfinity) - rounded);
+  return step_m > 0.1 * resolution_m ? std::optional(step_m) : std::nullopt;
+}
+
 std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m) {
   const auto position_of = [&](const MapPoint& point) { return positionIn(cloud, point); };
-  return coarseStepAt(cloud, position_of, resolution_m);
+  return coarseStepIn(cloud, position_of, resolution_m);
 }
 
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud) {

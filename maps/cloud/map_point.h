@@ -67,6 +67,8 @@ MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolutio
 /// of the resolution: programs that use floats round these points. Considers 99.9 % of the points,
 /// as a few wrong points may lie anywhere.
 std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m);
+/// Returns the same for one coordinate.
+std::optional<double> coarseStepAt(double coordinate_m, double resolution_m);
 
 /// Converts a map for functions of PCL that take this type alone, with the same `sensor_origin_`.
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud);

@@ -148,8 +148,16 @@ std::vector<Warning> MapperCore::warnings() {
   findings.session = &state;
   findings.options = &options;
   std::vector<Warning> warnings = warningsOf(findings);
-  const auto far = ended ? farPointsWarning(*newest(true)->points, voxel_size_m_) : std::nullopt;
-  if (far) warnings.push_back(*far);
+  double reach_m = 4 * options.keyframe.planes.max_depth_m;  // of points around the keyframes
+  for (const StampedPose& pose : newest(false)->trajectory) {
+    reach_m = std::max(reach_m, pose.T_world_rig.translation.cwiseAbs().maxCoeff() +
+                                    4 * options.keyframe.planes.max_depth_m);
+  }
+  if (ended && coarseStepAt(reach_m, voxel_size_m_)) {  // only then is the map exported
+    if (auto far = farPointsWarning(*newest(true)->points, voxel_size_m_)) {
+      warnings.push_back(std::move(*far));
+    }
+  }
   const auto no_keyframe = ended ? noKeyframe(state, options) : std::nullopt;
   if (no_keyframe) warnings.insert(warnings.begin(), *no_keyframe);
   return warnings;

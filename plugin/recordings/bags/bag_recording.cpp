@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -274,6 +275,9 @@ std::string frameOf(const RosTopic& topic) {
   return frame;
 }
 
+/// Returns the tree of frames. It is read at the first call: most bags do not need it.
+using Frames = std::function<const FrameTree&()>;
+
 /// Returns the transforms of topics, which must outlive the tree.
 FrameTree treeOf(const RosTopics& topics) {
   return FrameTree([&topics](const FrameTree::Take& take) {
@@ -405,7 +409,7 @@ std::string readPoses(const RosTopic& topic, FramedPoses& poses) {
 
 /// Takes the poses. Joins their frame to the frame of camera 0's events, as far as the transforms
 /// tell.
-void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses poses,
+void takeJoined(const Frames& tree, const std::string& camera, FramedPoses poses,
                 const ReaderOptions& options, RecordingParts& parts) {
   const std::string& body = poses.frames.child;
   const bool differ = !camera.empty() && !body.empty() && body != camera;
@@ -413,7 +417,7 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
     to.push_back({"pose-frame", text});
   };
   FrameTree::Way way;
-  if (camera.empty() && !body.empty() && !options.has_hand_eye && tree.hasBelow(body)) {
+  if (camera.empty() && !body.empty() && !options.has_hand_eye && tree().hasBelow(body)) {
     say(parts.warnings,
         fmt::format(
             "{}: the poses are those of the frame {}, but transforms join it to others, and "
@@ -427,7 +431,7 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
     for (StampedPose& pose : poses.chain[0]) pose.T_world_rig = pose.T_world_rig.inverse();
   } else if (differ) {
     try {
-      way = tree.way(body, camera);
+      way = tree().way(body, camera);
     } catch (const std::runtime_error&) {
       if (!options.has_hand_eye) throw;  // it replaces all ways
     }
@@ -444,8 +448,10 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
               poses.name, body, camera, camera, body));
     }
   }
-  for (auto& transform : tree.along(way)) poses.chain.push_back(std::move(transform));
-  if (!way.empty() && parts.poses_damage.empty()) parts.poses_damage = tree.damage();
+  if (!way.empty()) {
+    for (auto& transform : tree().along(way)) poses.chain.push_back(std::move(transform));
+    if (parts.poses_damage.empty()) parts.poses_damage = tree().damage();
+  }
   std::uint64_t left_out;
   parts.poses = productOf(poses.chain, left_out);
   if (parts.poses.empty()) {
@@ -459,8 +465,9 @@ void takeJoined(const FrameTree& tree, const std::string& camera, FramedPoses po
 }
 
 /// Reads the poses of "/tf:world->body". @param option value of `--topics`.
-void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const std::string& option,
+void addPosesOfFrames(const Frames& frames, const std::string& camera, const std::string& option,
                       const ReaderOptions& options, RecordingParts& parts) {
+  const FrameTree& tree = frames();
   try {
     const std::string topic = topicIn(option);
     const FrameTree::Way way =
@@ -476,7 +483,7 @@ void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const st
                     [](const auto& transform) { return transform.size() == 1; })) {
       throw std::runtime_error("constant: expected frames that move against each other");
     }
-    takeJoined(tree, camera, std::move(poses), options, parts);
+    takeJoined(frames, camera, std::move(poses), options, parts);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("--topics {}: {}{}", option, error.what(),
                                          tree.damage().empty() ? "" : beforeThe(tree.damage())));
@@ -485,7 +492,7 @@ void addPosesOfFrames(const FrameTree& tree, const std::string& camera, const st
 
 /// @param candidates topics with poses. @param cameras topics with events.
 void addPoses(const RosTopics& topics, RosTopics candidates, const RosTopics& cameras,
-              const FrameTree& tree, const ReaderOptions& options, RecordingParts& parts) {
+              const Frames& tree, const ReaderOptions& options, RecordingParts& parts) {
   const std::string camera =
       parts.camera_frames.empty() ? options.camera_frame : parts.camera_frames.front().name;
   std::string transforms;  // the name of a topic
@@ -508,7 +515,7 @@ void addPoses(const RosTopics& topics, RosTopics candidates, const RosTopics& ca
   }
   parts.expected_poses += plans;
   if (candidates.empty()) {
-    for (const std::string& choice : tree.choices(camera)) {
+    for (const std::string& choice : tree().choices(camera)) {
       parts.expected_poses += fmt::format(
           "{} --topics \"{}:{}\"",
           parts.expected_poses.back() == '"' ? "," : "; or those of a frame,", transforms, choice);
@@ -547,14 +554,14 @@ void addPoses(const RosTopics& topics, RosTopics candidates, const RosTopics& ca
 }
 
 /// Takes the frames of the cameras' events, and the cameras' poses by the transforms.
-void addCameraFrames(const RosTopics& cameras, const FrameTree& tree, RecordingParts& parts) {
+void addCameraFrames(const RosTopics& cameras, const Frames& tree, RecordingParts& parts) {
   for (const RosTopic& camera : cameras) {
     auto& frame = parts.camera_frames.emplace_back();
     frame.name = frameOf(camera);
     const std::string& first = parts.camera_frames.front().name;
     if (frame.name.empty() || frame.name == first) continue;
     try {
-      const FrameChain chain = tree.along(tree.way(first, frame.name));
+      const FrameChain chain = tree().along(tree().way(first, frame.name));
       Rigid3 T_cam0_cam;
       bool constant = !chain.empty();
       for (const auto& transform : chain) {
@@ -638,12 +645,20 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
   for (const std::filesystem::path& file : options.events_files) {
     for (RosTopic& topic : topicsOf(openBagFiles(file))) with_frames.push_back(std::move(topic));
   }
-  const FrameTree tree = treeOf(with_frames);
+  std::optional<FrameTree> read;
+  const Frames tree = [&]() -> const FrameTree& {
+    if (!read) read = treeOf(with_frames);
+    return *read;
+  };
   addCameraFrames(cameras, tree, parts);
   if (options.lists_topics) {
     std::transform(topics.begin(), topics.end(), std::back_inserter(parts.topics), recorded);
-    parts.transforms =
-        tree.transforms(cameras.empty() ? options.camera_frame : parts.camera_frames[0].name);
+    try {
+      parts.transforms =
+          tree().transforms(cameras.empty() ? options.camera_frame : parts.camera_frames[0].name);
+    } catch (const std::runtime_error& error) {  // the poses may not need them
+      parts.notes.push_back({"pose-frame", fmt::format("no transforms: {}", error.what())});
+    }
   }
   if (!options.leaves_out_poses) addPoses(topics, with_poses, cameras, tree, options, parts);
   addCalibration(topics, cameras, parts);

@@ -84,23 +84,27 @@ std::string sourceNames(const std::vector<Path>& sources) {
   return names;
 }
 
+template <typename Value>
+void moveAll(std::vector<Value>& from, std::vector<Value>& to) {
+  std::move(from.begin(), from.end(), std::back_inserter(to));
+}
+
 /// Adds the parts of further files.
 void append(RecordingParts parts, const Path& source, RecordingParts& all) {
-  std::move(parts.cameras.begin(), parts.cameras.end(), std::back_inserter(all.cameras));
-  std::move(parts.poses.begin(), parts.poses.end(), std::back_inserter(all.poses));
+  moveAll(parts.cameras, all.cameras);
+  moveAll(parts.poses, all.poses);
   if (parts.calibration && all.calibration) {
     throw std::runtime_error(fmt::format(
         "{}: a second calibration, beside {}: expected one of all cameras, or --calibration FILE",
         source.string(), all.calibration->file.string()));
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
-  std::move(parts.warnings.begin(), parts.warnings.end(), std::back_inserter(all.warnings));
-  std::move(parts.notes.begin(), parts.notes.end(), std::back_inserter(all.notes));
-  std::move(parts.topics.begin(), parts.topics.end(), std::back_inserter(all.topics));
-  std::move(parts.transforms.begin(), parts.transforms.end(), std::back_inserter(all.transforms));
+  moveAll(parts.warnings, all.warnings);
+  moveAll(parts.notes, all.notes);
+  moveAll(parts.topics, all.topics);
+  moveAll(parts.transforms, all.transforms);
   all.camera_frames.resize(all.cameras.size() - parts.cameras.size());
-  std::move(parts.camera_frames.begin(), parts.camera_frames.end(),
-            std::back_inserter(all.camera_frames));
+  moveAll(parts.camera_frames, all.camera_frames);
   if (all.poses_damage.empty()) all.poses_damage = std::move(parts.poses_damage);
   if (!all.default_size) all.default_size = parts.default_size;
   if (all.one_camera.empty()) all.one_camera = std::move(parts.one_camera);
@@ -242,8 +246,8 @@ void addGivenPoses(const RecordingSource& source, bool has_hand_eye, RecordingPa
   parts.poses = std::move(given.poses);
   parts.pose_samples.clear();
   parts.poses_damage.clear();
-  std::move(given.warnings.begin(), given.warnings.end(), std::back_inserter(parts.warnings));
-  std::move(given.notes.begin(), given.notes.end(), std::back_inserter(parts.notes));
+  moveAll(given.warnings, parts.warnings);
+  moveAll(given.notes, parts.notes);
 }
 
 /// @throws std::runtime_error for poses of a source that are not one trajectory.

@@ -238,6 +238,7 @@ RecordingParts posesOfRecording(const fs::path& file, ReaderOptions options) {
   options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
   if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
+  requireOneTrajectory(parts.poses, file.string());
   if (!parts.poses.empty()) return parts;
   throw std::runtime_error(
       fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));
@@ -249,6 +250,7 @@ RecordingParts readAnyPoses(const fs::path& file, const ReaderOptions& options) 
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
   if (looksLikeNumpy(file)) {
     parts.poses = readPoseArrays(file, options);
+    requireOneTrajectory(parts.poses, file.string());
     return parts;
   }
   const std::string start = firstContentOf(file, 4096);
@@ -351,7 +353,6 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source) {
 RecordingParts readPoseParts(const fs::path& file, const ReaderOptions& options) {
   RecordingParts parts = readAnyPoses(file, options);
   parts.poses = requirePoses(std::move(parts.poses), file);
-  requireOneTrajectory(parts.poses, file.string());
   return parts;
 }
 

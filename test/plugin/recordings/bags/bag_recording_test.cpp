@@ -605,6 +605,11 @@ TEST_F(BagRecording, TransformsThatContradictEachOtherAreErrors) {
   early.transform("/tf", 5 * kMsNs, "map", "odom", {});
   early.transform("/tf", 9 * kMsNs, "map", "odom", {{1, 0, 0, 0}, {1, 0, 0}});
   EXPECT_THAT(errorOfBag(early, {"/tf:map->base"}), HasSubstr("have no time in common"));
+  RobotBag broken = robot;  // poses that need no transforms are read
+  broken.messages.push_back({"/tf", "tf2_msgs/TFMessage", kStartNs, "no message"});
+  broken.messages.push_back(poseAt("/pose", kPose, kStartNs, RosBytes::kCdr));
+  EXPECT_EQ(errorOfBag(broken, {}), "no error");
+  EXPECT_THAT(errorOfBag(broken, {"/tf:map->base"}), HasSubstr("/tf: message of 1700000000.0"));
   RobotBag bodies = robot;
   bodies.odometry("base");
   bodies.pose("/odom", kOdometry, kStartNs + 7 * kMsNs, "odom", "other", {});
