@@ -187,12 +187,12 @@ inline void checkSignals() {
 }
 
 /// Writes a map as the name of the file says.
-inline void savePoints(const MapCloud& cloud, const std::filesystem::path& file) {
+inline void savePoints(const MapSnapshot& map, const std::filesystem::path& file) {
   const auto type = file.extension();
   if (type != ".ply" && type != ".pcd") {
     throw std::invalid_argument(file.string() + ": expected a name that ends with .pcd or .ply");
   }
-  type == ".ply" ? writePly(file, cloud) : writePcd(file, cloud);
+  type == ".ply" ? writePly(file, *map.points, map.trajectory) : writePcd(file, *map.points);
 }
 
 using OnKeyframe = std::function<void(const std::shared_ptr<const Keyframe>&)>;
@@ -202,9 +202,6 @@ inline void give(const Keyframe& keyframe, const OnKeyframe& on_keyframe) {
   const py::gil_scoped_acquire held;
   on_keyframe(std::make_shared<const Keyframe>(keyframe));
 }
-
-/// Returns a text of the engine with the arguments of Python in place of the program's options.
-std::string pythonText(const std::string& text);
 
 /// Defines the functions that map, evaluate and simulate.
 void defineJobs(py::module_& module);

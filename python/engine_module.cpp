@@ -13,7 +13,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <regex>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -25,6 +24,7 @@
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/text/event_columns.h"
+#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {
@@ -173,32 +173,9 @@ void addRecording(Mapper& mapper, const RecordingSource& source) {
   }
 }
 
-}  // namespace
-
-std::string pythonText(const std::string& text) {
-  static const std::pair<std::regex, const char*> kNames[] = {
-      {std::regex("--set ([a-z_]+\\.[a-z_]+)=([^\\s);,]+)"), "options={'$1': '$2'}"},
-      {std::regex("--sensor-size ([0-9]+)x([0-9]+)"), "sensor_size=($1, $2)"},
-      {std::regex("--(poses|calibration|topics|format)( (?=[A-Z0-9\"'/])|(?=[^a-z-]|$))"), "$1="},
-      {std::regex("--hand-eye ?"), "hand_eye="},
-      {std::regex("--pose-time-unit ?"), "pose_time_unit="},
-      {std::regex("--time-unit ?"), "time_unit="},
-      {std::regex("--event-columns ?"), "event_columns="},
-      {std::regex("--skip-bad-events ?"), "skip_bad_events="},
-      {std::regex("stopped by a signal"), "stopped"},
-  };
-  std::string named = text;
-  if (text.find("--") == std::string::npos && text.find("signal") == std::string::npos)
-    return named;
-  for (const auto& [option, argument] : kNames) named = std::regex_replace(named, option, argument);
-  return named;
-}
-
-namespace {
-
 /// Sets an error of Python. Names of files need not be UTF-8.
 void setError(PyObject* type, const char* what) {
-  const std::string text = pythonText(what);
+  const std::string text = hostText(what, HostFace::kRecording);
   const auto decoded = py::reinterpret_steal<py::object>(
       PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
   if (decoded) PyErr_SetObject(type, decoded.ptr());
@@ -395,17 +372,13 @@ void defineRecordings(py::module_& module) {
                        std::string event_columns, std::string time_unit, std::string pose_time_unit,
                        std::optional<std::pair<int, int>> sensor_size,
                        std::uint64_t skip_bad_events, std::vector<int> cameras) {
-        RecordingSource source =
-            sourceOf(files, {std::move(poses), std::move(calibration), std::move(hand_eye), {}});
-        source.format = std::move(format);
-        source.reader.topics = std::move(topics);
-        source.reader.columns = std::move(event_columns);
-        source.reader.time_unit = std::move(time_unit);
-        source.reader.pose_time_unit = std::move(pose_time_unit);
-        if (sensor_size) source.reader.sensor_size = {sensor_size->first, sensor_size->second};
-        source.skip_bad_events = skip_bad_events;
-        source.cameras = std::move(cameras);
-        return source;
+        Overrides overrides{std::move(poses),          std::move(calibration),
+                            std::move(hand_eye),       {},
+                            std::move(format),         std::move(topics),
+                            std::move(event_columns),  std::move(time_unit),
+                            std::move(pose_time_unit), sensor_size,
+                            skip_bad_events,           std::move(cameras)};
+        return sourceOf(files, overrides);
       }))
       .def("set_limits", [](RecordingSource& source, std::optional<std::int64_t> t0_ns,
                             std::optional<std::int64_t> t1_ns) {
@@ -455,7 +428,7 @@ void defineMapper(py::module_& module) {
       .def(
           "save",
           [](const Mapper& mapper, const std::filesystem::path& file) {
-            savePoints(*mapper.points(), file);
+            savePoints(*mapper.snapshot(), file);
           },
           releases)
       .def(
@@ -477,7 +450,7 @@ void defineMapper(py::module_& module) {
           [](const Mapper& mapper) {
             std::vector<std::pair<std::string, std::string>> warnings;
             for (const Warning& warning : mapper.warnings()) {
-              warnings.emplace_back(warning.name, pythonText(warning.text));
+              warnings.emplace_back(warning.name, warning.text);
             }
             return warnings;
           },
@@ -490,7 +463,9 @@ PYBIND11_MODULE(_engine, module) {
   PYBIND11_NUMPY_DTYPE(EventRecord, x, y, p, t);
   PYBIND11_NUMPY_DTYPE(PointRecord, x, y, z, intensity, support, sigma);
   module.attr("VERSION") = EFM_VERSION;
-  module.def("python_text", &pythonText);
+  hostIsPython() = true;
+  module.def("python_text",
+             [](const std::string& text) { return hostText(text, HostFace::kRecording); });
   module.attr("EVENT_DTYPE") = py::dtype::of<EventRecord>();
   translateErrors();
   defineCameras(module);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Whole recordings: mapped, evaluated and simulated as the program does.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "arrays.h"
 #include "mapping/base/atomic_file.h"
+#include "mapping/depth/aggregated_extraction.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/depth_file.h"
@@ -84,9 +86,34 @@ struct WindowDsi {
   }
 };
 
-py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int64_t t0_ns,
-                 std::int64_t t1_ns, std::optional<std::int64_t> t_ref_ns,
-                 const OnProgress& on_progress) {
+/// Returns the window of all events with poses; given limits stay as they are.
+/// @throws std::runtime_error if there are none.
+TimeLimits wholeWindow(const RecordingSource& source, TimeLimits window) {
+  if (window.t0_ns && window.t1_ns) return window;
+  std::int64_t first_ns = kEndOfTimeNs, last_ns = -kEndOfTimeNs;
+  std::int64_t first_pose_ns = kEndOfTimeNs, last_pose_ns = -kEndOfTimeNs;
+  const auto recording = openRecording(source);
+  while (const auto sample = recording->next()) {
+    checkSignals();
+    if (const auto* pose = std::get_if<PoseSample>(&*sample)) {
+      first_pose_ns = std::min(first_pose_ns, pose->t_ns);
+      last_pose_ns = std::max(last_pose_ns, pose->t_ns);
+    }
+    const auto* packet = std::get_if<EventPacket>(&*sample);
+    if (packet == nullptr || packet->events.empty()) continue;
+    const std::int64_t offset_ns = packet->calibration.time_offset_ns;
+    first_ns = std::min(first_ns, trajectoryTime(packet->events.front().t_ns, offset_ns));
+    last_ns = std::max(last_ns, trajectoryTime(packet->events.back().t_ns, offset_ns));
+  }
+  first_ns = std::max(first_ns, first_pose_ns);
+  last_ns = std::min(last_ns, last_pose_ns);
+  if (first_ns > last_ns) throw std::runtime_error("the recording has no event with poses");
+  return {window.t0_ns.value_or(first_ns), window.t1_ns.value_or(last_ns + 1)};
+}
+
+py::tuple mapDsi(const RecordingSource& source, const Options& options,
+                 std::optional<std::int64_t> t0_ns, std::optional<std::int64_t> t1_ns,
+                 std::optional<std::int64_t> t_ref_ns, const OnProgress& on_progress) {
   auto dsi = std::make_shared<WindowDsi>();
   std::shared_ptr<const Keyframe> made;
   MapResult result;
@@ -94,7 +121,8 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
     const Released released;
     MapJob job = jobOf(source, options, nullptr, on_progress);
     FusionMapperOptions& mapper = job.options.mapper;
-    mapper.only_window = windowOf(t0_ns, t1_ns, mapper.policy.reference);
+    const TimeLimits window = wholeWindow(job.sourceNow(), {t0_ns, t1_ns});
+    mapper.only_window = windowOf(*window.t0_ns, *window.t1_ns, mapper.policy.reference);
     if (t_ref_ns) mapper.only_window->t_ref_ns = *t_ref_ns;
     job.options.mapper.validate();
     job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
@@ -116,7 +144,14 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
   const py::array values = sharedArray(
       py::dtype::of<float>(), {dsi->num_planes, dsi->size.height, dsi->size.width},
       {row * dsi->size.height, row, py::ssize_t{sizeof(float)}}, dsi->values.data(), dsi);
-  return py::make_tuple(values, depths, made);
+  cv::Mat1f largest = cv::Mat1f::zeros(dsi->size);
+  for (int plane = 0; plane < dsi->num_planes; ++plane) {
+    const cv::Mat1f of(largest.rows, largest.cols,
+                       &dsi->values[static_cast<std::size_t>(plane) * largest.total()]);
+    largest = cv::max(largest, of);
+  }
+  const int window = result.report.options.mapper.keyframe.extraction.threshold_kernel;
+  return py::make_tuple(values, depths, made, imageOf(localContrast(largest, window)));
 }
 
 std::string infoOf(const RecordingSource& source) {
@@ -203,8 +238,7 @@ void defineJobs(py::module_& module) {
       .def_property_readonly("report", [](const MapResult& r) { return reportJson(r.report); })
       .def_property_readonly("doubts", [](const MapResult& r) { return r.report.doubts; })
       .def(
-          "save", [](const MapResult& r, const Path& file) { savePoints(*r.map->points, file); },
-          releases)
+          "save", [](const MapResult& r, const Path& file) { savePoints(*r.map, file); }, releases)
       .def("reject_error", &MapResult::rejectError);
   module.def("run_map", &mapRecordingInto, releases);
   module.def("run_dsi", &mapDsi);

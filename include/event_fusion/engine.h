@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
@@ -71,12 +72,23 @@ class Options {
   bool as_they_are_ = false;
 };
 
-/// Files that replace parts of a recording, and limits.
+/// Files that replace parts of a recording, limits, and how to read the files.
 struct Overrides {
   std::filesystem::path poses;        ///< Poses of the rig: text, NumPy, or another recording.
   std::filesystem::path calibration;  ///< Kalibr, DSEC, TUM-VIE, camera_info, nine numbers, …
   std::filesystem::path hand_eye;     ///< T_body_rig; the poses are then poses of the body.
   TimeLimits limits;                  ///< Other events are not read. On the clock of the poses.
+
+  // What cannot be found in the files: the options of event-fusion map with these names.
+  std::string format = "auto";
+  std::vector<std::string> topics;
+  std::string event_columns;
+  std::string time_unit;  ///< Of events: s, ms, us or ns. Empty: found.
+  std::string pose_time_unit;
+  std::optional<std::pair<int, int>> sensor_size;  ///< Width and height of all sensors.
+  std::uint64_t skip_bad_events = 0;               ///< Maximum number.
+  /// The cameras of the calibration that the recording has, if the calibration has more.
+  std::vector<int> cameras;
 };
 
 /// Opens a recording of any format that `event-fusion map` reads. It has all cameras and all poses.
@@ -133,8 +145,8 @@ class Mapper {
   /// there is no such camera.
   void addEvents(int camera, std::vector<Event> events);
   /// Adds the next pose, on the clock of the poses; the rotation is normalised. The pose is rounded
-  /// as the poses of recordings are (time to 100 ns, rotation in its last digit), so that the same
-  /// poses make the same map in every way. Of two poses of the same time the first one is used.
+  /// as the poses of recordings are (time to 100 ns, rotation to 1e-12 rad), so that the same poses
+  /// make the same map in every way. Of two poses of the same time the first one is used.
   /// @param noise standard deviations that the tracker states, for the refinement.
   /// @throws std::invalid_argument if the pose is not finite, or a second older than the newest
   /// one.
@@ -204,6 +216,9 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
 void writePcd(const std::filesystem::path& file, const MapCloud& cloud);
 /// Writes a binary PLY file, coloured by height along the world's z axis. (map.ply of a recording
 /// is coloured along the mean upward axis of its cameras.)
-void writePly(const std::filesystem::path& file, const MapCloud& cloud);
+/// @param views keyframes of the map, `Mapper::trajectory`: each point gets a normal towards the
+/// first keyframe that saw it. Empty: no normals.
+void writePly(const std::filesystem::path& file, const MapCloud& cloud,
+              const std::vector<StampedPose>& views = {});
 
 }  // namespace efm

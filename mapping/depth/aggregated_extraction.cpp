@@ -183,15 +183,6 @@ std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
   return agreement;
 }
 
-namespace {
-
-// A step: see `planesPerStep`.
-constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
-constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
-constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
-constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
-
-/// Returns the confidence minus its Gaussian mean, divided by the mean of the confidences above 0.
 cv::Mat1f localContrast(const cv::Mat1f& confidence, int window) {
   cv::Mat1f surroundings;
   cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
@@ -199,6 +190,14 @@ cv::Mat1f localContrast(const cv::Mat1f& confidence, int window) {
   if (!(mean > 0)) return cv::Mat1f::zeros(confidence.size());
   return (confidence - surroundings) / mean;
 }
+
+namespace {
+
+// A step: see `planesPerStep`.
+constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
+constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
+constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
+constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
 
 cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
   cv::Mat1b mask = cv::Mat1b::zeros(contrast.size());

@@ -58,10 +58,13 @@ std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near);
 
+/// Returns the local contrast: the confidence minus its Gaussian mean in a window of this side
+/// (pixels), divided by the mean of the confidences above 0.
+cv::Mat1f localContrast(const cv::Mat1f& confidence, int window);
+
 /// Implements `ExtractionMethod::kAggregated`. The paper takes every peak with enough contrast in
 /// the image, even if the peak is flat along the ray or its neighbours disagree. Here:
-/// 1. Select the pixels whose local contrast is above `min_local_contrast`. Local contrast:
-///    confidence minus its Gaussian mean in a window, over the mean confidence of the keyframe.
+/// 1. Select the pixels whose local contrast is above `min_local_contrast`.
 /// 2. Sum the DSI columns around each (`aggregateColumns`); the peak of the sum is its first depth.
 /// 3. The depth of a pixel is the median of the first depths in 9x9 pixels, weighted by local
 ///    contrast (`localAgreement`).

@@ -60,6 +60,9 @@ class Choice {
     this->planes(planes.num_planes, reason);
     return {take(), false, (planes.num_planes - 1) / parallaxBetween(planes, 1)};
   }
+  void voxel(double size_m, const std::string& reason) {
+    chosen_.push_back({"voxel_size_m", size_m, reason});
+  }
   std::vector<ChosenOption> take() { return std::move(chosen_); }
 
  private:
@@ -91,15 +94,18 @@ double roundedUp(double value, int digits) {
   return std::ceil(value / unit * (1 - 1e-9)) * unit;
 }
 
+ReferenceView viewOf(const Rig& rig, const FusionMapperOptions& options) {
+  const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
+  return makeReferenceView(rig.cameras.at(reference).model, options.keyframe.view);
+}
+
 /// Returns the longest window in which most of the view stays in sight, seconds.
 double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
                    const FusionMapperOptions& options, const SceneDepths& depths, double max_s) {
   // The view may move by this fraction of its width to either side.
   constexpr double kMaxMove = 0.2;
   constexpr double kMinWindowS = 0.01;
-  const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
-  const ReferenceView view =
-      makeReferenceView(rig.cameras.at(reference).model, options.keyframe.view);
+  const ReferenceView view = viewOf(rig, options);
   const auto moveOf = [&](const ViewMotion& motion) {
     return (motion.shift_m * depths.median() + motion.rotation_rad) * view.fx / view.width;
   };
@@ -267,7 +273,14 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
   choice.planes(
       automaticPlanes(planes, parallax_px_m),
       number(parallaxBetween(planes, parallax_px_m)) + " pixels of parallax between the limits");
-  return {choice.take(), true, parallax_px_m, is_proven};
+  std::optional<double> voxel_m;
+  if (automatic.voxel_size_m && !depths.inverse.empty()) {
+    const double median_m = 1 / depths.median();
+    const double rounded_m = roundedDown(median_m / viewOf(rig, options).fx, 1);
+    voxel_m = std::round(std::clamp(rounded_m, 1e-6, 1000.0) * 1e6) / 1e6;  // its digits alone
+    choice.voxel(*voxel_m, "a pixel at the median depth, " + number(median_m) + " m");
+  }
+  return {choice.take(), true, parallax_px_m, is_proven, voxel_m};
 }
 
 OptionChoice chooseWideDepths(const AutomaticOptions& automatic, FusionMapperOptions& options) {

@@ -21,6 +21,7 @@ struct AutomaticOptions {
   bool num_planes = false;
   bool window_s = false;
   bool stride_s = false;
+  bool voxel_size_m = false;
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -29,8 +30,11 @@ struct AutomaticOptions {
     visit("num_planes", self.num_planes);
     visit("window_s", self.window_s);
     visit("stride_s", self.stride_s);
+    visit("voxel_size_m", self.voxel_size_m);
   }
-  bool any() const { return min_depth_m || max_depth_m || num_planes || window_s || stride_s; }
+  bool any() const {
+    return min_depth_m || max_depth_m || num_planes || window_s || stride_s || voxel_size_m;
+  }
 };
 
 /// The result of `chooseOptions`.
@@ -42,6 +46,7 @@ struct OptionChoice {
   double parallax_px_m = 0;
   /// True if the parallax proves the depths of the scene. Otherwise the limits are a guess.
   bool is_proven = false;
+  std::optional<double> voxel_size_m = std::nullopt;  ///< Of the map, if it is automatic.
 };
 
 /// Sets automatic options to values that fit the other options, until the values are chosen.
@@ -59,7 +64,8 @@ FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
 /// - the window: as long as most of the view stays in sight, up to a second, and a quarter of the
 ///   recording; the stride: half of the window;
 /// - planes: neighbouring planes are about a pixel of parallax apart, over the cameras and the
-///   window's motion.
+///   window's motion;
+/// - the voxels of the map: as large as a pixel at the median depth.
 /// The same samples give the same choice.
 /// @param duration_s of the part of the recording with poses; std::nullopt: not known yet.
 /// @param options in: the values that are kept if nothing can be chosen; out: the choice.

@@ -146,13 +146,14 @@ void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
 }  // namespace
 
 void writePlyTo(std::ostream& stream, const MapCloud& cloud,
-                const std::vector<PointColour>& colours) {
+                const std::vector<PointColour>& colours, const std::vector<StampedPose>& views) {
   assert(colours.size() == cloud.size());
   NumberText header;
   header << "ply\nformat binary_little_endian 1.0\nelement vertex " << cloud.size()
-         << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n"
-            "property uchar green\nproperty uchar blue\nproperty float confidence\n"
-            "property uint support\nend_header\n";
+         << "\nproperty double x\nproperty double y\nproperty double z\n";
+  if (!views.empty()) header << "property float nx\nproperty float ny\nproperty float nz\n";
+  header << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+            "property float confidence\nproperty uint support\nend_header\n";
   stream << header.str();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const MapPoint& point = cloud[i];
@@ -162,6 +163,12 @@ void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                                pointText({p_world, point.intensity}) + ": expected finite numbers");
     }
     for (const double value : p_world) writeLittleEndian(stream, value);
+    if (!views.empty()) {
+      const std::size_t view = std::min<std::size_t>(point.first_keyframe, views.size() - 1);
+      const Eigen::Vector3f normal =
+          (views[view].T_world_rig.translation - p_world).normalized().cast<float>();
+      for (const float value : normal) writeLittleEndian(stream, value);
+    }
     for (const std::uint8_t value : colours[i]) writeLittleEndian(stream, value);
     writeLittleEndian(stream, point.intensity);
     writeLittleEndian(stream, point.support);

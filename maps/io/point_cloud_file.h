@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/geometry/trajectory.h"
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/map_point.h"
 
@@ -40,11 +41,14 @@ void writePcdTo(std::ostream& stream, const MapCloud& cloud);
 PointCloudContent parsePcd(std::string_view bytes);
 
 /// Writes a binary little-endian file of the Stanford polygon format, version 1.0, for viewers. Per
-/// vertex: x, y, z (double: maps may lie far from the origin), red, green, blue (uchar), confidence
-/// (float) and support (uint).
+/// vertex: x, y, z (double: maps may lie far from the origin), nx, ny, nz (float), red, green, blue
+/// (uchar), confidence (float) and support (uint).
 /// @param colours one per point.
+/// @param views the keyframes of the cloud: normals point to the first one that saw the point.
+/// Empty: no normals.
 void writePlyTo(std::ostream& stream, const MapCloud& cloud,
-                const std::vector<PointColour>& colours);
+                const std::vector<PointColour>& colours,
+                const std::vector<StampedPose>& views = {});
 
 /// Parses the Stanford polygon format, version 1.0. The element `vertex` is the cloud.
 PointCloudContent parsePly(std::string_view bytes);

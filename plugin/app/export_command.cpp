@@ -29,7 +29,6 @@ int runImport(const ImportArguments& arguments) {
   if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
   RecordingSource source = arguments.source;
   source.complete = false;
-  source.rounded = false;  // the writer rounds
   source.reader.keep_originals = true;
   source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);

@@ -262,7 +262,7 @@ unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
   std::unique_lock<std::mutex> lock(made_mutex_);
   const auto mapper = mapperOfMade();
-  const GlobalCloudOptions cloud_options = usedOptions().cloud;
+  const GlobalCloudOptions cloud_options = mapper->core().cloudOptions();
   const auto map_so_far = mapper->keyframes();
   MapCloud::ConstPtr points = map_so_far->points;  // null in playback
   if (!points) {
@@ -286,7 +286,7 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 /// Warns once.
 void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
   if (warned_of_rounding_) return;
-  const auto warning = roundingWarning(points, usedOptions().cloud.voxel_size_m);
+  const auto warning = roundingWarning(points, mapper()->core().cloudOptions().voxel_size_m);
   if (warning && !warned_of_rounding_.exchange(true)) MRPT_LOG_WARN(*warning);
 }
 

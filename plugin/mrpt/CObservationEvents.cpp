@@ -221,7 +221,7 @@ mrpt::opengl::CRenderizable::Ptr pointsOf(const CObservationEvents& packet,
 }  // namespace
 
 RigCamera calibrationOf(const CObservationEvents& packet) {
-  return {packet.camera, rigidFrom(packet.camera_pose), packet.time_offset_ns};
+  return {packet.camera, roundedPose(rigidFrom(packet.camera_pose)), packet.time_offset_ns};
 }
 
 void CObservationEvents::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {

@@ -94,11 +94,13 @@ std::optional<PoseSample> poseIn(const mrpt::obs::CObservation& observation) {
   }
   const std::int64_t t_ns = nanosecondsFrom(observation.timestamp);
   if (robot == nullptr) {
-    return PoseSample{
-        *poseSourceOf(observation), t_ns, rigidFrom(mrpt::poses::CPose3D(odometry->odometry)), {}};
+    return PoseSample{*poseSourceOf(observation),
+                      t_ns,
+                      roundedPose(rigidFrom(mrpt::poses::CPose3D(odometry->odometry))),
+                      {}};
   }
-  return PoseSample{*poseSourceOf(observation), t_ns, rigidFrom(robot->pose.mean),
-                    rigidFrom(robot->sensorPose).inverse(), noiseOf(robot->pose)};
+  return PoseSample{*poseSourceOf(observation), t_ns, roundedPose(rigidFrom(robot->pose.mean)),
+                    roundedPose(rigidFrom(robot->sensorPose)).inverse(), noiseOf(robot->pose)};
 }
 
 mrpt::obs::CObservation::Ptr poseObservation(const PoseSample& pose) {

@@ -269,8 +269,7 @@ CObservation::Ptr packetOf(EventPacket packet) {
   observation->timestamp = packet.t_ns ? mrptTimeFrom(*packet.t_ns) : INVALID_TIMESTAMP;
   observation->camera_index = packet.camera;
   observation->camera = camera.model;
-  // The original pose is kept, because a second conversion would change the last digits.
-  const bool is_original = original && isSame(rigidFrom(original->camera_pose), camera.T_rig_cam);
+  const bool is_original = original && isSame(calibrationOf(*original).T_rig_cam, camera.T_rig_cam);
   observation->camera_pose = is_original ? original->camera_pose : mrptPoseFrom(camera.T_rig_cam);
   observation->time_offset_ns = camera.time_offset_ns;
   observation->events = std::move(packet.events);
@@ -397,7 +396,6 @@ std::uint64_t GzStream::getPosition() const {
 
 RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options) {
   RecordingParts parts;
-  parts.rounded = true;
   std::map<int, CObservationEvents::Ptr> cameras;
   bool has_others = false;
   RawlogReader reader(file);

@@ -20,6 +20,7 @@
 #include "plugin/results/pictures/picture.h"
 #include "plugin/results/viewer/map_page.h"
 #include "plugin/session/first_look.h"
+#include "plugin/session/host_text.h"
 #include "plugin/session/mapper_core.h"
 
 namespace efm {
@@ -282,6 +283,7 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
     fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, options.mapper.policy,
                  choice.options);
     first.chosen = std::move(choice.options);
+    options.cloud.voxel_size_m = choice.voxel_size_m.value_or(options.cloud.voxel_size_m);
     options.automatic = {};
     if (!choice.is_proven) {
       report.doubts.push_back(choice.found_scene
@@ -454,7 +456,8 @@ void writeMap(MapSteps& steps, const KeyframeSheet& sheet) {
   const SecondsScope scope(times.real.map, times.cpu.output);
   steps.write([&] { output.writeCloud("map.pcd", *map.points); });
   if (options.ply) {
-    steps.write([&] { output.writeColouredCloud(*map.points, upwardOf(map.trajectory)); });
+    steps.write(
+        [&] { output.writeColouredCloud(*map.points, upwardOf(map.trajectory), map.trajectory); });
   }
   steps.write([&] { writeSimpleMap(steps.job, output, map.keyframes); });
   steps.write([&] { output.writeTrajectory("trajectory.txt", map.trajectory); });
@@ -588,11 +591,17 @@ MapResult mapWindowInto(MapJob job) {
 Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options,
                     const Overrides& overrides) {
-  MapJob job = MapJob::of(sourceOf(files, overrides), options);
-  job.out = out;
-  MapResult result = mapInto(std::move(job));
-  result.rejectError();
+  MapResult result = forHost(HostFace::kRecording, [&] {
+    MapJob job = MapJob::of(sourceOf(files, overrides), options);
+    job.out = out;
+    MapResult made = mapInto(std::move(job));
+    made.rejectError();
+    return made;
+  });
   MapReport& report = result.report;
+  for (Warning& warning : report.warnings) {
+    warning.text = hostText(warning.text, HostFace::kRecording);
+  }
   std::string json = reportJson(report);
   return {report.counts.keyframes, report.points, std::move(report.warnings),
           std::move(report.doubts), std::move(json)};

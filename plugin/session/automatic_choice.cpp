@@ -194,6 +194,15 @@ void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen)
     depth_follower_.emplace(automatic_, planes, choice.parallax_px_m);
   }
   mapper_.configure(chosen.policy, planes);
+  if (choice.voxel_size_m) {
+    options_.cloud.voxel_size_m = *choice.voxel_size_m;
+    cloud_ = RefinedCloud(options_.cloud, options_.movableKeyframes());
+  }
+  if (!std::exchange(automatic_.voxel_size_m, false)) {  // it was chosen before
+    for (ChosenOption& option : status_.chosen) {
+      if (option.key == "voxel_size_m") choice.options.push_back(std::move(option));
+    }
+  }
   status_.chosen = std::move(choice.options);
   status_.scene_unknown = !choice.is_proven;
   ++status_.choices;

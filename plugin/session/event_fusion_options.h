@@ -117,7 +117,7 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options);
 /// Returns the default options of programs: each option that can be automatic is automatic.
 inline EventFusionOptions defaultOptions() {
   EventFusionOptions options;
-  options.automatic = {true, true, true, true, true};
+  options.automatic = {true, true, true, true, true, false};
   options.mapper.keyframe.motion.correct_motion = MotionCorrectionUse::kAuto;
   return options;
 }

@@ -19,6 +19,14 @@ namespace {
 /// Time span of the poses around the middle of a sample: see `scene_depths.h`.
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
+/// Events are subsampled in periods of this grid, so that the choice does not depend on packets.
+constexpr std::int64_t kPeriodNs = 10'000'000;
+/// Events may come this much later than a newer one.
+constexpr std::int64_t kMaxDelayNs = 10'000'000;
+
+std::int64_t periodOf(std::int64_t t_ns) {
+  return t_ns / kPeriodNs - (t_ns % kPeriodNs < 0 ? 1 : 0);
+}
 
 EventPacket subsampled(const EventPacket& packet) {
   double length_s = 0;
@@ -98,8 +106,63 @@ FirstLook::FirstLook(const EventFusionOptions& options)
 
 void FirstLook::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
-  for (EventPacket& ready : rig_.add(subsampled(packet), mapper_)) feed(std::move(ready));
+  const auto isEarlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
+  Waiting& waiting = waiting_[packet.camera];
+  if (!packet.events.empty() && !packet.checked) {  // rejected as the mapping rejects it
+    requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
+    const auto [oldest, newest] =
+        std::minmax_element(packet.events.begin(), packet.events.end(), isEarlier);
+    if (oldest->t_ns < waiting.newest_ns - kMaxDelayNs) reject(*oldest, packet.camera, "too old");
+    if (newest->t_ns > kEndOfTimeNs) reject(*newest, packet.camera, "beyond all times");
+  }
+  const std::vector<Event> earlier = std::move(waiting.packet.events);
+  waiting.packet = packet;
+  std::vector<Event>& events = waiting.packet.events;
+  events.insert(events.begin(), earlier.begin(), earlier.end());
+  if (!std::is_sorted(events.begin(), events.end(), isEarlier)) {
+    std::stable_sort(events.begin(), events.end(), isEarlier);
+  }
+  if (!events.empty()) waiting.newest_ns = std::max(waiting.newest_ns, events.back().t_ns);
+  addPeriods(waiting.packet, std::max(waiting.newest_ns - kMaxDelayNs,
+                                      packet.covered_until_ns.value_or(-kEndOfTimeNs)));
+  const bool begins =
+      !packet.events.empty() &&
+      rig_.isReady(trajectoryTime(packet.events.front().t_ns, packet.calibration.time_offset_ns),
+                   pose_source_.selected().has_value());
+  if (begins) completeRig();
   takeWindows();
+}
+
+/// Adds the periods of a camera's waiting events that end before a time.
+void FirstLook::addPeriods(EventPacket& waiting, std::int64_t complete_ns) {
+  const auto inPeriod = [](const Event& a, const Event& b) {
+    return periodOf(a.t_ns) < periodOf(b.t_ns);
+  };
+  const auto end = std::partition_point(
+      waiting.events.begin(), waiting.events.end(), [complete_ns](const Event& event) {
+        return (periodOf(event.t_ns) + 1) * kPeriodNs <= complete_ns;
+      });
+  const std::vector<Event> complete(waiting.events.begin(), end);
+  waiting.events.erase(waiting.events.begin(), end);  // also if one is rejected
+  EventPacket period = waiting;
+  period.events.clear();
+  period.covered_until_ns.reset();
+  for (auto first = complete.begin(); first != complete.end();) {
+    if (!period.events.empty()) add(period);
+    const auto last = std::upper_bound(first, complete.end(), *first, inPeriod);
+    period.events.assign(first, last);
+    period.t_ns = first->t_ns;
+    first = last;
+  }
+  period.covered_until_ns = waiting.covered_until_ns;
+  if (period.covered_until_ns && !waiting.events.empty()) {
+    period.covered_until_ns = std::min(*period.covered_until_ns, waiting.events.front().t_ns);
+  }
+  if (!period.events.empty() || period.covered_until_ns || waiting.events.empty()) add(period);
+}
+
+void FirstLook::add(const EventPacket& packet) {
+  for (EventPacket& ready : rig_.add(subsampled(packet), mapper_)) feed(std::move(ready));
 }
 
 void FirstLook::feed(EventPacket packet) {
@@ -112,7 +175,6 @@ void FirstLook::feed(EventPacket packet) {
   if (empty) return;
   extend(events_, begin_ns);
   extend(events_, last_ns);
-  if (rig_.isReady(begin_ns, pose_source_.selected().has_value())) completeRig();
 }
 
 void FirstLook::addPose(const PoseSample& pose) {
@@ -162,6 +224,7 @@ bool FirstLook::take(const Sample& sample) {
 
 RecordingSurvey FirstLook::finish() {
   try {
+    for (auto& [camera, waiting] : waiting_) addPeriods(waiting.packet, kMaxTimeNs);
     usePoses(pose_source_.select());
     mapper_.finish();
     completeRig();

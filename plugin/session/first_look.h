@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,6 +60,8 @@ class FirstLook {
   RecordingSurvey finish();
 
  private:
+  void addPeriods(EventPacket& waiting, std::int64_t complete_ns);
+  void add(const EventPacket& packet);
   void feed(EventPacket packet);
   void usePoses(const std::vector<StampedPose>& poses);
   void completeRig();
@@ -65,6 +69,12 @@ class FirstLook {
   void keep(const WindowData& data);
 
   RigAssembly rig_;
+  /// The newest packet of a camera, with all its events whose period may not be complete.
+  struct Waiting {
+    EventPacket packet;
+    std::int64_t newest_ns = -kEndOfTimeNs;
+  };
+  std::map<int, Waiting> waiting_;  // by camera
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   SpreadSamples samples_;

@@ -50,7 +50,7 @@ std::string clockGuess(const TimeSpan& events, const TimeSpan& poses) {
     if (fitsWith(1 / factor, events, poses)) {
       return fmt::format(
           "they fit if the poses' times are in {0}: --pose-time-unit {0}; or the events' times are "
-          "in a larger unit than --time-unit says",
+          "in a larger unit (--time-unit)",
           unit);
     }
   }

@@ -1,34 +1,67 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "event_fusion/engine.h"
 #include "plugin/session/event_fusion_options.h"
+#include "plugin/session/host_text.h"
 #include "plugin/session/mapper_core.h"
 
 namespace efm {
 
+namespace {
+
+constexpr HostFace kFace = HostFace::kMapper;
+
+Mapper::Callbacks forHost(Mapper::Callbacks callbacks) {
+  for (auto* log : {&callbacks.warn, &callbacks.info}) {
+    if (!*log) continue;
+    *log = [log = std::move(*log)](const std::string& text) { log(hostText(text, kFace)); };
+  }
+  return callbacks;
+}
+
+std::vector<Warning> forHost(std::vector<Warning> warnings) {
+  for (Warning& warning : warnings) warning.text = hostText(warning.text, kFace);
+  return warnings;
+}
+
+}  // namespace
+
 Mapper::Mapper(const Options& options, Callbacks callbacks,
                const std::vector<StoredKeyframe>& earlier)
-    : core_(MapperCore::make(options.values(), std::move(callbacks), earlier)) {}
+    : core_(forHost(kFace, [&] {
+        return MapperCore::make(options.values(), forHost(std::move(callbacks)), earlier);
+      })) {}
 
 Mapper::~Mapper() = default;
 
-int Mapper::addCamera(const RigCamera& camera) { return core_->addCamera(camera); }
+int Mapper::addCamera(const RigCamera& camera) {
+  return forHost(kFace, [&] { return core_->addCamera(camera); });
+}
 void Mapper::addEvents(int camera, std::vector<Event> events) {
-  core_->addEvents(camera, std::move(events));
+  forHost(kFace, [&] { core_->addEvents(camera, std::move(events)); });
 }
 void Mapper::addPose(const StampedPose& pose, const std::optional<PoseNoise>& noise) {
   PoseSample sample;
   sample.t_ns = nearestTick(pose.t_ns);
   sample.T_world_body = roundedPose(pose.T_world_rig);
   sample.noise = noise;
-  core_->add(std::move(sample));
+  add(std::move(sample));
 }
-void Mapper::add(Sample sample) { core_->add(std::move(sample)); }
-void Mapper::finish() { core_->finish(); }
+void Mapper::add(Sample sample) {
+  forHost(kFace, [&] { core_->add(std::move(sample)); });
+}
+void Mapper::finish() {
+  forHost(kFace, [&] { core_->finish(); });
+}
 void Mapper::stop() { core_->stop(); }
 
 std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return core_->newest(true); }
 std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return core_->newest(false); }
-SessionStatus Mapper::status() const { return core_->status(); }
-std::vector<Warning> Mapper::warnings() const { return core_->warnings(); }
+SessionStatus Mapper::status() const {
+  SessionStatus status = core_->status();
+  status.pose_warnings = forHost(std::move(status.pose_warnings));
+  if (status.live) status.live->last_error = hostText(status.live->last_error, kFace);
+  return status;
+}
+std::vector<Warning> Mapper::warnings() const { return forHost(core_->warnings()); }
 
 }  // namespace efm

@@ -44,7 +44,6 @@ MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                        const std::vector<StoredKeyframe>& earlier)
     : options_(options.live),
       callbacks_(std::move(callbacks)),
-      voxel_size_m_(options.cloud.voxel_size_m),
       setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
       statistics_(statisticsOptions(withSetup(options, setup_))),
       session_(withSetup(options, setup_)) {
@@ -96,7 +95,7 @@ void MapperCore::addEvents(int camera, std::vector<Event> events) {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
     if (index >= cameras_.size()) {
       throw std::invalid_argument(
-          fmt::format("events of camera {}: there are {} cameras: expected addCamera before",
+          fmt::format("events of camera {}: there are {} cameras: expected a camera that was added",
                       camera, cameras_.size()));
     }
     packet.num_cameras = static_cast<int>(cameras_.size());
@@ -153,8 +152,9 @@ std::vector<Warning> MapperCore::warnings() {
     reach_m = std::max(reach_m, pose.T_world_rig.translation.cwiseAbs().maxCoeff() +
                                     4 * options.keyframe.planes.max_depth_m);
   }
-  if (ended && coarseStepAt(reach_m, voxel_size_m_)) {  // only then is the map exported
-    if (auto far = farPointsWarning(*newest(true)->points, voxel_size_m_)) {
+  const double voxel_size_m = cloudOptions().voxel_size_m;
+  if (ended && coarseStepAt(reach_m, voxel_size_m)) {  // only then is the map exported
+    if (auto far = farPointsWarning(*newest(true)->points, voxel_size_m)) {
       warnings.push_back(std::move(*far));
     }
   }
@@ -170,6 +170,11 @@ FusionMapperOptions MapperCore::usedOptions() const {
   }
   const std::lock_guard<TurnMutex> lock(session_mutex_);
   return session_.usedOptions();
+}
+
+GlobalCloudOptions MapperCore::cloudOptions() const {
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
+  return session_.cloudOptions();
 }
 
 /// Warns of an input that made no keyframe or whose poses blur the events, and lets `warnings` say

@@ -83,6 +83,8 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   void skip(const EventPacket& packet);
   void finish();
   void stop();
+  /// Returns the options of the map, with the chosen voxel size.
+  GlobalCloudOptions cloudOptions() const;
   /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
   bool runsHere() const { return std::this_thread::get_id() == worker_; }
   /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
@@ -133,7 +135,6 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
 
   const LiveOptions options_;
   const Callbacks callbacks_;
-  const double voxel_size_m_;
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;

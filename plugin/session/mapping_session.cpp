@@ -352,6 +352,7 @@ void MappingSession::dropOlderHalf() {
 
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
                                    const Rigid3& T_world_ref) {
+  automatic_.voxel_size_m = options_.automatic.voxel_size_m = false;
   cloud_.insertFixed(points, T_world_ref);
 }
 

@@ -108,6 +108,8 @@ class MappingSession {
   }
   /// Returns the options in use; automatic options have their chosen values.
   const FusionMapperOptions& usedOptions() const { return options_.mapper; }
+  /// Returns the options of the cloud: the voxel size is chosen at most once, for an empty cloud.
+  const GlobalCloudOptions& cloudOptions() const { return options_.cloud; }
 
  private:
   const DepthPlanesOptions& planes() const {
@@ -151,8 +153,8 @@ class MappingSession {
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
   void moveKeyframes(double tolerance_m);
 
-  const AutomaticOptions automatic_;  // as the user gave them
-  EventFusionOptions options_;        // `automatic`: the options that are still to be chosen
+  AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
+  EventFusionOptions options_;  // `automatic`: the options that are still to be chosen
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   LiveGuard guard_;

@@ -50,6 +50,7 @@ void RigAssembly::declare(FusionMapper& mapper) {
   if (!time_offsets_ns_.empty()) setup_.calibration->requireCameras(time_offsets_ns_.size());
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     RigCamera camera = cameras[i];
+    camera.T_rig_cam = roundedPose(camera.T_rig_cam);
     if (!time_offsets_ns_.empty()) camera.time_offset_ns = time_offsets_ns_[i];
     addCamera(camera, mapper);
   }
@@ -100,6 +101,7 @@ void RigAssembly::applyOptions(EventPacket& packet) {
                     camera),
         {{"rig", "calibration"}});
   }
+  recorded.T_rig_cam = roundedPose(recorded.T_rig_cam);
   if (time_offsets_ns_.empty()) return;
   requireOption(camera < time_offsets_ns_.size(), timeOffsets(), time_offsets_ns_.size(),
                 fmt::format("one per camera, and there is camera {}", camera));

@@ -22,20 +22,29 @@ std::int64_t nearestTick(std::int64_t t_ns) {
 }
 
 Rigid3 roundedPose(const Rigid3& T_a_b) {
-  // The operations have MRPT's order, so that the last bit is equal.
-  const Eigen::Quaterniond unit = T_a_b.rotation.normalized();
-  const double sign = unit.w() < 0 ? -1 : 1;
-  double r = sign * unit.w(), x = sign * unit.x(), y = sign * unit.y(), z = sign * unit.z();
-  const double scale = 1.0 / std::sqrt(r * r + x * x + y * y + z * z);
-  r *= scale;
-  x *= scale;
-  y *= scale;
-  z *= scale;
-  Eigen::Matrix3d R_a_b;
-  R_a_b << r * r + x * x - y * y - z * z, 2 * (x * y - r * z), 2 * (z * x + r * y),  //
-      2 * (x * y + r * z), r * r - x * x + y * y - z * z, 2 * (y * z - r * x),       //
-      2 * (z * x - r * y), 2 * (y * z + r * x), r * r - x * x - y * y + z * z;
-  return {Eigen::Quaterniond(R_a_b).normalized(), T_a_b.translation};
+  constexpr double kSteps = 1099511627776.0;  // 2^40: of 1
+  // One component is at least 0.5, so one is found. Special rotations have no component near this
+  // bound, so that the last digits do not decide which one it is.
+  constexpr double kLarge = 0.4321;
+  Rigid3 rounded = T_a_b;
+  Eigen::Vector4d q(T_a_b.rotation.w(), T_a_b.rotation.x(), T_a_b.rotation.y(), T_a_b.rotation.z());
+  q /= q.norm();  // 0 becomes NaN, which is rejected later
+  int large = 0;
+  while (large < 3 && !(std::abs(q[large]) > kLarge)) ++large;
+  if (q[large] < 0) q = -q;
+  double rest = 1;
+  for (int i = 0; i < 4; ++i) {
+    if (i == large) continue;
+    q[i] = std::round(q[i] * kSteps) / kSteps + 0.0;  // not -0
+    rest -= q[i] * q[i];
+  }
+  q[large] = std::sqrt(rest);
+  rounded.rotation = {q[0], q[1], q[2], q[3]};
+  return rounded;
+}
+
+Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {
+  return roundedPose(pose.T_world_body * T_body_rig.value_or(pose.T_body_rig));
 }
 
 }  // namespace efm

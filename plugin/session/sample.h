@@ -57,10 +57,8 @@ struct OtherSample {
   std::shared_ptr<const void> original;
 };
 
-/// Returns T_world_rig. @param T_body_rig replaces the recording's, if set.
-inline Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {
-  return pose.T_world_body * T_body_rig.value_or(pose.T_body_rig);
-}
+/// Returns T_world_rig, see `roundedPose`. @param T_body_rig replaces the recording's, if set.
+Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig);
 
 /// Returns the time of an event on the clock of the poses. The arguments may be unchecked: they are
 /// limited to kEndOfTimeNs, so that their sum and differences of results do not overflow.
@@ -72,9 +70,10 @@ using Sample = std::variant<EventPacket, PoseSample, OtherSample>;
 /// clock. At 300 px/s this is an error of 1.5e-5 px.
 inline constexpr std::int64_t kTickNs = 100;
 std::int64_t nearestTick(std::int64_t t_ns);
-/// Returns a pose as it is after MRPT's classes held it: the rotation becomes a matrix there, which
-/// changes the last digits. With this rounding a recording gives the same map, bit for bit, as
-/// text, as a rawlog and through a host.
+/// Returns a pose with a rounded rotation: three components of its quaternion are multiples of
+/// 2^-40 (1e-12 rad), the fourth one follows from them. A rotation that became a matrix and a
+/// quaternion again, as in MRPT's classes and NumPy, differs in its last digits; rounded, it is the
+/// same. So a recording gives the same map, bit for bit, as text, as a rawlog and through a host.
 Rigid3 roundedPose(const Rigid3& T_a_b);
 
 /// A topic of a bag. Its messages were recorded between two times: those of the bag's chunks.

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import operator
 import os
+import sys
 from collections.abc import Mapping
 from decimal import Decimal, InvalidOperation
 from functools import cache
+from time import monotonic
 from typing import Any, Callable, Union
 
 import numpy as np
@@ -19,7 +21,7 @@ from ._engine import EVENT_DTYPE
 Array = npt.NDArray[Any]
 Path = Union[str, "os.PathLike[str]"]
 Options = Union[Mapping[str, Any], Path]
-#: True shows a bar of tqdm, where it is installed. A function gets the activity and the fraction that is done.
+#: True shows a bar of tqdm, or a line where it is not installed. A function gets the activity and the fraction that is done.
 Progress = Union[bool, Callable[[str, float], Any]]
 
 _NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
@@ -223,6 +225,21 @@ def engine_options(options: Options | None) -> _engine.Options:
     return made
 
 
+class _Percentage:
+    """A line with the progress and the time that remains, where tqdm is not installed."""
+
+    def __init__(self, total: float, desc: str, **_: object) -> None:
+        self.n, self.desc, self._total, self._begin = 0.0, desc, total, monotonic()
+
+    def update(self, more: float) -> None:
+        self.n += more
+        left = (monotonic() - self._begin) * (self._total / self.n - 1) if self.n > 0 else 0
+        print(f"\r{self.desc}: {self.n / self._total:4.0%}, {left:.0f} s left ", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
+
+
 class ProgressBar:
     """Calls of the engine, as the progress that a user asked for. A context gives what to call, and closes the bar."""
 
@@ -236,7 +253,7 @@ class ProgressBar:
 
                 self._make = tqdm
             except ImportError:
-                pass
+                self._make = _Percentage
 
     def __call__(self, activity: str, fraction: float) -> None:
         if self._callback is not None:

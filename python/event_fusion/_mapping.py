@@ -110,6 +110,8 @@ class Mapper:
 
     def add_camera(self, camera: Camera) -> int:
         """Add a camera and return its index, from 0. All cameras come before the events."""
+        if not isinstance(camera, Camera):
+            raise TypeError(f"camera = {camera!r}: expected an event_fusion.Camera")
         return self._mapper.add_camera(camera)
 
     def add_events(self, camera: int, array: npt.ArrayLike, time_unit: str = "ns") -> None:
@@ -132,7 +134,7 @@ class Mapper:
         TypeError
             If the array has not these fields.
         """
-        self._mapper.add_events(camera, event_records(array, time_unit))
+        self._mapper.add_events(whole("camera", camera), event_records(array, time_unit))
 
     def add_pose(self, t: float, T_world_rig: npt.ArrayLike, time_unit: str = "ns") -> None:
         """Add the next pose, on the clock of the events. Events and poses may come in any order.
@@ -142,8 +144,8 @@ class Mapper:
         t : int or float
             Time.
         T_world_rig : array_like, shape (4, 4) or (7,)
-            A matrix, or tx ty tz qx qy qz qw as in a TUM file. (The last digits of a map depend on it: the rotation of
-            a matrix is rounded when it becomes a quaternion.)
+            A matrix, or tx ty tz qx qy qz qw as in a TUM file. Both make the same map, bit for bit: rotations are
+            rounded to 1e-12 rad.
         time_unit : {'ns', 'us', 'ms', 's'}
             Unit of the time. Seconds as floats are exact to 0.2 µs today.
 
@@ -419,7 +421,7 @@ def map(
     keep : bool
         False: a keyframe lives as long as the loop uses it, so that memory does not grow with the recording.
     progress : bool or callable
-        True: a bar, where tqdm is installed. A function gets the activity and the fraction that is done, ten times a
+        True: a bar of tqdm, or a line where it is not installed. A function gets the activity and the fraction that is done, ten times a
         second, in another thread; its exceptions end the mapping.
 
     Returns
@@ -450,9 +452,12 @@ class Dsi(tuple):  # type: ignore[type-arg]
     keyframe : Keyframe
         The view, as `Keyframe.pose` and `Keyframe.K`, and the depth map of the DSI. A depth is not at the largest value
         of its own pixel: the values of neighbouring pixels are summed first (``depth.extraction``: aggregated).
+    contrast : numpy.ndarray, float32, shape (rows, columns)
+        Local contrast of the largest values: above ``depth.min_local_contrast`` a pixel is a candidate for a depth.
     """
 
     keyframe: Keyframe
+    contrast: Array
 
     def __repr__(self) -> str:
         return f"<Dsi of shape {self.values.shape}, {self.depths[0]:.3g} to {self.depths[-1]:.3g} m>"
@@ -470,8 +475,8 @@ class Dsi(tuple):  # type: ignore[type-arg]
 
 def dsi(
     recording: Recording | Path,
-    t0: int | str,
-    t1: int | str,
+    t0: int | str | None = None,
+    t1: int | str | None = None,
     options: Options | None = None,
     *,
     t_ref: int | str | None = None,
@@ -484,7 +489,7 @@ def dsi(
     recording : Recording or path
         See `open`.
     t0, t1 : int or str
-        The window [t0, t1): nanoseconds, or text as in `open`.
+        The window [t0, t1): nanoseconds, or text as in `open`. By default the first and the last event with poses.
     options : mapping or path
         See `map`.
     t_ref : int or str
@@ -503,7 +508,7 @@ def dsi(
     t0_ns, t1_ns, t_ref_ns = times_in(source, t0=t0, t1=t1, t_ref=t_ref)
     checked = engine_options(options)
     with ProgressBar(progress) as on_progress:
-        values, depths, keyframe = _engine.run_dsi(source, checked, t0_ns, t1_ns, t_ref_ns, on_progress)
+        values, depths, keyframe, contrast = _engine.run_dsi(source, checked, t0_ns, t1_ns, t_ref_ns, on_progress)
     made = Dsi((values, depths))
-    made.keyframe = keyframe
+    made.keyframe, made.contrast = keyframe, contrast
     return made

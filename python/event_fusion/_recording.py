@@ -179,9 +179,9 @@ def simulate(
     *,
     duration: float | None = None,
     out: Path | None = None,
-    progress: Progress = False,
+    progress: Progress = True,
 ) -> Recording:
-    """Simulate a recording with exact ground truth.
+    """Simulate a recording with exact ground truth: this takes some ten seconds to some minutes.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def simulate(
     out : path
         The new folder of the recording. By default a temporary one, which lives as long as the result.
     progress : bool or callable
-        See `map`.
+        See `map`. By default a bar, which tells how long it takes.
 
     Returns
     -------

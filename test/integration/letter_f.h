@@ -20,7 +20,7 @@ inline void expectF(const cv::Mat& mask) {
   };
   EXPECT_GT(quarter(1, 0), quarter(0, 0) / 4);
   EXPECT_GT(quarter(0, 1), quarter(0, 0) / 4);
-  EXPECT_LT(quarter(1, 1), quarter(0, 1) / 4);
+  EXPECT_LT(quarter(1, 1), quarter(0, 1) / 3) << "large dots of the middle bar reach into it";
 }
 
 }  // namespace efm

@@ -171,7 +171,8 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   EXPECT_GT(measured["drawn"], 100'000);
   EXPECT_THAT(measured["text"].get<std::string>(),
               testing::AllOf(HasSubstr("of the 2,300,000 points of the map"),
-                             HasSubstr("left out to keep it small"), HasSubstr("made-up-warning")));
+                             HasSubstr("left out to keep it small"), HasSubstr("made-up-warning"),
+                             HasSubstr("made-up-note")));
 }
 
 /// Returns the mean colour (BGR) of the drawn pixels in some rows of a box.

@@ -19,6 +19,7 @@
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
+#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {
@@ -339,8 +340,7 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
   for (std::size_t camera = 0; camera < count; ++camera) {
     RigCamera& of_rig = rig.cameras[camera];
     if (replaced) of_rig = given->camera(camera, knownSize(of_rig.model));
-    const bool is_rounded = parts.rounded && !replaced;
-    if (source.rounded && !is_rounded) of_rig.T_rig_cam = roundedPose(of_rig.T_rig_cam);
+    of_rig.T_rig_cam = roundedPose(of_rig.T_rig_cam);
   }
   return rig;
 }
@@ -357,14 +357,14 @@ std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& sourc
 }
 
 /// Makes samples of poses without other data.
-std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool rounded) {
+std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses) {
   std::vector<PoseSample> samples;
   samples.reserve(poses.size());
   for (const StampedPose& pose : poses) {
     PoseSample& sample = samples.emplace_back();
     sample.source.label = "pose";
     sample.t_ns = nearestTick(pose.t_ns);
-    sample.T_world_body = rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig;
+    sample.T_world_body = roundedPose(pose.T_world_rig);
   }
   return samples;
 }
@@ -373,8 +373,7 @@ std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool ro
 /// except for its time and T_world_body.
 /// @param T_body_rig replaces that of the samples, if set.
 std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFaults faults,
-                                   bool rounded, const std::optional<Rigid3>& T_body_rig,
-                                   const Rig& rig) {
+                                   const std::optional<Rigid3>& T_body_rig, const Rig& rig) {
   faults.perturbation.tick_ns = kTickNs;
   std::stable_sort(samples.begin(), samples.end(),
                    [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
@@ -398,7 +397,7 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
       if (next->t_ns == pose.t_ns) ++next;
       sample.t_ns = pose.t_ns;
       if (!faults.move() || !pose.T_world_rig.translation.allFinite()) continue;
-      sample.T_world_body = rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig;
+      sample.T_world_body = roundedPose(pose.T_world_rig);
     }
   }
   return all;
@@ -411,15 +410,13 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const RecordingSource& so
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
   }
-  const bool moved = source.faults.move();
   std::vector<PoseSample> samples = std::move(parts.pose_samples);
-  if (samples.empty()) samples = samplesOf(parts.poses, source.rounded || moved);
+  if (samples.empty()) samples = samplesOf(parts.poses);
   if (source.faults.any()) {
-    samples = withFaults(std::move(samples), source.faults, source.rounded, setup.T_body_rig, rig);
+    samples = withFaults(std::move(samples), source.faults, setup.T_body_rig, rig);
   }
   if (source.override_rig && setup.T_body_rig) {
-    const Rigid3 T_body_rig =
-        source.rounded ? roundedPose(setup.T_body_rig->inverse()).inverse() : *setup.T_body_rig;
+    const Rigid3 T_body_rig = roundedPose(setup.T_body_rig->inverse()).inverse();
     for (PoseSample& sample : samples) {
       if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = T_body_rig;
     }
@@ -520,9 +517,37 @@ std::vector<TruthDepth> openTruth(const RecordingSource& source) {
   return truth;
 }
 
+namespace {
+
+/// The recording of a program, whose errors name Overrides.
+class HostRecording : public Recording {
+ public:
+  explicit HostRecording(std::unique_ptr<Recording> of) : of_(std::move(of)) {}
+  std::optional<Sample> next() override {
+    return forHost(HostFace::kRecording, [this] { return of_->next(); });
+  }
+  const Rig& rig() const override { return of_->rig(); }
+  std::string position() const override { return of_->position(); }
+  double progress() const override { return of_->progress(); }
+  RecordingCounts counts() const override {
+    RecordingCounts counts = of_->counts();
+    for (std::vector<Warning>* of : {&counts.warnings, &counts.notes}) {
+      for (Warning& warning : *of) warning.text = hostText(warning.text, HostFace::kRecording);
+    }
+    return counts;
+  }
+
+ private:
+  std::unique_ptr<Recording> of_;
+};
+
+}  // namespace
+
 std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path>& files,
                                          const Overrides& overrides) {
-  return openRecording(sourceOf(files, overrides));
+  return forHost(HostFace::kRecording, [&] {
+    return std::make_unique<HostRecording>(openRecording(sourceOf(files, overrides)));
+  });
 }
 
 RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
@@ -539,6 +564,16 @@ RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
   source.calibration_given = given("calibration", overrides.calibration);
   source.hand_eye_given = given("hand_eye", overrides.hand_eye);
   source.limits = overrides.limits;
+  source.format = overrides.format;
+  source.reader.topics = overrides.topics;
+  source.reader.columns = overrides.event_columns;
+  source.reader.time_unit = overrides.time_unit;
+  source.reader.pose_time_unit = overrides.pose_time_unit;
+  if (overrides.sensor_size) {
+    source.reader.sensor_size = {overrides.sensor_size->first, overrides.sensor_size->second};
+  }
+  source.skip_bad_events = overrides.skip_bad_events;
+  source.cameras = overrides.cameras;
   return source;
 }
 

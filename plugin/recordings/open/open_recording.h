@@ -35,8 +35,6 @@ struct RecordingSource {
   /// True if the given calibration and hand-eye transform replace those of the recording. If false,
   /// they are used only if the recording has none: the mapping's options replace the others later.
   bool override_rig = true;
-  /// True if `roundedPose` rounds the poses of trackers and cameras. A rawlog writer rounds itself.
-  bool rounded = true;
 
   ReaderOptions reader;
   /// The maximum number of bad events that are left out of the recording. One more is an error.

@@ -117,8 +117,6 @@ struct RecordingParts {
 
   std::vector<StampedPose> poses;        ///< T_world_body, in any order.
   std::vector<PoseSample> pose_samples;  ///< Poses of a rawlog, in place of `poses`.
-  /// True if poses and calibration went through MRPT's classes: see `roundedPose`.
-  bool rounded = false;
   std::unique_ptr<OtherStream> others;  ///< Other objects of a rawlog; null: none.
   /// The error of damage after the last of `poses`; empty if there is no damage.
   std::string poses_damage;

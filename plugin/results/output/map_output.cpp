@@ -317,10 +317,11 @@ void MapOutput::writeCloud(const std::string& name, const MapCloud& cloud) {
   write(folder_ / name, byStream([&](std::ostream& file) { writePcdTo(file, cloud); }));
 }
 
-void MapOutput::writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward) {
+void MapOutput::writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward,
+                                   const std::vector<StampedPose>& views) {
   const std::vector<PointColour> colours = coloursByHeight(cloud, upward);
   write(folder_ / "map.ply",
-        byStream([&](std::ostream& file) { writePlyTo(file, cloud, colours); }));
+        byStream([&](std::ostream& file) { writePlyTo(file, cloud, colours, views); }));
 }
 
 void MapOutput::writeFile(const std::string& name,
@@ -350,10 +351,12 @@ void MapOutput::writeReport(const std::string& json) {
   removeFile(folder_ / RunMark::kName);
 }
 
-void writePly(const std::filesystem::path& file, const MapCloud& cloud) {
+void writePly(const std::filesystem::path& file, const MapCloud& cloud,
+              const std::vector<StampedPose>& views) {
   const std::vector<PointColour> colours = coloursByHeight(cloud, Eigen::Vector3d::UnitZ());
   AtomicFile atomic(file);
-  byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours); })(atomic.temporary());
+  byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours, views); })(
+      atomic.temporary());
   atomic.replace();
 }
 

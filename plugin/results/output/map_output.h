@@ -88,9 +88,10 @@ class MapOutput {
   void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
   /// Writes points. @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const MapCloud& cloud);
-  /// Writes map.ply, coloured by height.
-  /// @param upward a unit vector, frame `world`.
-  void writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward);
+  /// Writes map.ply, coloured by height, with normals towards the keyframes.
+  /// @param upward a unit vector, frame `world`. @param views the keyframes of the cloud.
+  void writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward,
+                          const std::vector<StampedPose>& views);
   /// Writes a file by a function. @param name "map.simplemap".
   /// @param write writes the file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,

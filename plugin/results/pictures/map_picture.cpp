@@ -7,8 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
@@ -53,26 +57,39 @@ class ShownPositions {
     }
   }
 
-  /// Returns the extent without the lowest and the highest percent of the points.
-  Extent ofPoints(const Eigen::Vector3d& axis) const {
+  /// Returns the extent of the points. The lowest and the highest percent of them count as far as
+  /// they lie at most a fraction of the extent of the others beyond it.
+  Extent ofPoints(const Eigen::Vector3d& axis, double beyond) const {
     std::vector<double> values(samples_.size());
     std::transform(samples_.begin(), samples_.end(), values.begin(),
                    [&](const Eigen::Vector3d& p) { return p.dot(axis); });
     Extent extent;
     if (values.empty()) return extent;
+    std::sort(values.begin(), values.end());
+    const double last = static_cast<double>(values.size() - 1);
     for (const double fraction : {0.01, 0.99}) {
-      const auto at =
-          values.begin() + std::lround(fraction * static_cast<double>(values.size() - 1));
-      std::nth_element(values.begin(), at, values.end());
-      extent.add(*at);
+      extent.add(values[static_cast<std::size_t>(std::lround(fraction * last))]);
     }
+    const double margin = beyond * extent.length();
+    const Extent wide = {extent.low - margin, extent.high + margin};
+    extent.low = *std::lower_bound(values.begin(), values.end(), wide.low);
+    extent.high = *std::prev(std::upper_bound(values.begin(), values.end(), wide.high));
     return extent;
   }
 
+  /// Returns the extent of a view: points and trajectory. A trajectory that lies far from the
+  /// points is left out, or it would have most of the picture.
   Extent along(const Eigen::Vector3d& axis) const {
-    Extent extent = ofPoints(axis);
-    for (const StampedPose& pose : trajectory_) extent.add(pose.T_world_rig.translation.dot(axis));
-    return extent;
+    constexpr double kOutliers = 0.1;
+    constexpr double kMaxGap = 0.5;
+    constexpr std::size_t kMinPoints = 100;
+    const Extent points = ofPoints(axis, kOutliers);
+    Extent path;
+    for (const StampedPose& pose : trajectory_) path.add(pose.T_world_rig.translation.dot(axis));
+    const double gap_m = std::max(points.low - path.high, path.low - points.high);
+    const bool is_far = gap_m > kMaxGap * points.length() + path.length();
+    if (is_far && samples_.size() >= kMinPoints) return points;
+    return {std::min(points.low, path.low), std::max(points.high, path.high)};
   }
 
  private:
@@ -211,7 +228,7 @@ MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& traje
   layout.legend = {(layout.size.width - legend_width) / 2,
                    layout.size.height - kLegendHeight - kBorder, legend_width, kLegendHeight};
   if (!cloud.empty()) {
-    const Extent heights = positions.ofPoints(up);
+    const Extent heights = positions.ofPoints(up, 0);
     const double least = std::max(heights.length(), 0.01);
     layout.heights_m = {heights.low, heights.low + least};
   }
@@ -331,6 +348,25 @@ void drawTrajectory(cv::Mat3b& picture, const MapView& view,
   if (!pixels.empty()) drawPath(area, pixels, true);
 }
 
+/// Returns where the trajectory lies if a view does not show it: ", the cameras 0.7 m below".
+std::string placeOfPath(const MapView& view, const std::vector<StampedPose>& trajectory) {
+  Extent x, y;
+  for (const StampedPose& pose : trajectory) {
+    const cv::Point2d at = view.pixelOf(pose.T_world_rig.translation);
+    x.add(at.x);
+    y.add(at.y);
+  }
+  const cv::Rect& area = view.area;
+  const std::pair<double, const char*> sides[] = {{y.low - area.br().y, "below"},
+                                                  {area.y - y.high, "above"},
+                                                  {x.low - area.br().x, "right"},
+                                                  {area.x - x.high, "left"}};
+  const auto farthest = *std::max_element(std::begin(sides), std::end(sides));
+  if (!(farthest.first > 0)) return "";
+  return fmt::format(", the cameras {:.2g} m {}", farthest.first / view.pixels_per_m,
+                     farthest.second);
+}
+
 /// Returns the largest of 1, 2 or 5 times a power of ten that is at most `max_m`.
 double roundLength(double max_m) {
   const double power = std::pow(10.0, std::floor(std::log10(max_m)));
@@ -346,10 +382,13 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
   const double length_m = roundLength(220 / scale);
   const int length = cvRound(length_m * scale);
   cv::rectangle(picture, cv::Rect(area.x, area.y + 14, length, 6), kPlotInk, cv::FILLED);
-  writeText(picture, fmt::format("{:g} m", length_m), {area.x, area.br().y - 10}, kLabelScale);
-  const cv::Point sample(area.x + 290, area.y + 17);
-  drawPath(picture, {subpixel(sample), subpixel(sample + cv::Point(60, 0))}, false);
-  writeText(picture, "start to end", {sample.x - 6, area.br().y - 10}, kLabelScale);
+  const int baseline = area.y + 23;
+  writeText(picture, fmt::format("{:g} m", length_m), {area.x + length + 10, baseline},
+            kLabelScale);
+  const cv::Point sample(area.x, area.y + 47);
+  drawPath(picture, {subpixel(sample + cv::Point(6, 0)), subpixel(sample + cv::Point(66, 0))},
+           false);
+  writeText(picture, "start to end", {sample.x + 82, sample.y + 6}, kLabelScale);
   if (!has_points) return;
   const int width = std::min(600, area.width - 460);
   const cv::Mat3b bar = drawBar(layout.heights_m, kHeightPalette, "height (m)", width);
@@ -371,11 +410,13 @@ cv::Mat3b drawMap(const MapCloud& cloud, const std::vector<StampedPose>& traject
       std::max(0.6 * voxel_size_m * layout.top.pixels_per_m, 0.1 * std::sqrt(pixels_per_point)),
       0.8, 3.0);
   cv::Mat3b picture(layout.size, cv::Vec3b(255, 255, 255));
-  for (const auto& [view, name] : {std::pair{layout.top, "top view"}, {layout.side, "side view"}}) {
+  for (const auto& [view, name] :
+       {std::pair{layout.top, std::string("top view")}, {layout.side, "side view"}}) {
     drawPoints(picture, view, cloud, layout, sigma);
     drawTrajectory(picture, view, trajectory);
     cv::rectangle(picture, view.area, kMapGrey);
-    writeText(picture, name, view.area.tl() - cv::Point(0, 8), kLabelScale);
+    writeText(picture, name + placeOfPath(view, trajectory), view.area.tl() - cv::Point(0, 8),
+              kLabelScale);
   }
   drawLegend(picture, layout, !cloud.empty());
   return picture;

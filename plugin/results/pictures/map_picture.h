@@ -34,8 +34,9 @@ struct MapLayout {
 };
 
 /// Lays out the top view and the side view of a map, side by side or one above the other. The map
-/// is turned around the vertical so that the scale is as large as possible. The views show 98 % of
-/// the points along each axis and the whole trajectory, so far outliers do not change the scale.
+/// is turned around the vertical so that the scale is as large as possible. The views show at least
+/// 98 % of the points along each axis and the whole trajectory, so far outliers do not change the
+/// scale. A trajectory far from the points is left out where a view would be mostly empty.
 /// @param cloud may be empty.
 /// @param trajectory T_world_ref of the keyframes; not empty if there are no points.
 MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory);

@@ -120,8 +120,12 @@ void expectNear(const std::vector<CloudPoint>& read, const std::vector<CloudPoin
 TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
   const std::vector<CloudPoint> points = {{{450'000.125, 5'200'000.25, -3}, 17.5F, 4},
                                           {{449'999.5, 5'200'001, 2}, 0.25F, 70'000}};
+  const MapCloud::Ptr cloud = mapCloudOf(points, 0.01);
+  (*cloud)[1].first_keyframe = 1;
+  const std::vector<StampedPose> views = {{0, {{}, {450'000.125, 5'200'000.25, 7}}},
+                                          {1, {{}, {449'999.5, 5'200'006, 2}}}};
   std::ofstream file(folder() / "map.ply", std::ios::binary);
-  writePlyTo(file, *mapCloudOf(points, 0.01), {{1, 2, 3}, {254, 255, 0}});
+  writePlyTo(file, *cloud, {{1, 2, 3}, {254, 255, 0}}, views);
   file.close();
   const PointCloudContent content = readPointCloud(folder() / "map.ply");
   ASSERT_EQ(content.points.size(), 2U);
@@ -130,7 +134,10 @@ TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
   const std::string bytes = readBytes(folder() / "map.ply");
   EXPECT_THAT(bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
                                      "\nproperty float confidence\nproperty uint support\n"),
-                           EndsWith(std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))));
+                           HasSubstr(raw(-3.0) + raw(0.0F) + raw(0.0F) + raw(1.0F)),
+                           EndsWith(raw(2.0) + raw(0.0F) + raw(1.0F) + raw(0.0F) +
+                                    std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))))
+      << "normals from each point to its first keyframe";
   std::ostringstream stream;
   EXPECT_THAT(messageOf([&] {
                 writePlyTo(stream, *mapCloudOf({{{0, 0, 0}, INFINITY}}, 0.01), {{0, 0, 0}});

@@ -92,11 +92,38 @@ TEST(MrptPoseOf, IsTheSameAfterARoundTripAndAfterAnArchive) {
     mrpt::poses::CPose3D stored;
     archive >> stored;
     for (const mrpt::poses::CPose3D& same : {pose, stored}) {
-      ASSERT_TRUE(isSame(rigidFrom(same), roundedPose(T_a_b))) << "to the bit";
       ASSERT_EQ(rigidFrom(same).translation, T_a_b.translation) << kFromVertical[i % 4];
       ASSERT_LT(angleBetween(rigidFrom(same), T_a_b), 1e-14) << kFromVertical[i % 4];
     }
   }
+}
+
+TEST(RoundedPose, IsTheSameAfterAnyConversion) {
+  std::mt19937 random(2);
+  for (int i = 0; i < 100000; ++i) {
+    Rigid3 T_a_b = randomPose(random, i % 4 == 1 ? 1e-8 : 0);
+    if (i % 4 == 2) {  // rotations of a cube, as between a body and an optical frame
+      T_a_b.rotation.coeffs() = Eigen::Vector4d::Zero();
+      for (int k = 0; k < 4; ++k) T_a_b.rotation.coeffs()[k] = static_cast<int>(random() % 3) - 1;
+      if (T_a_b.rotation.norm() < 0.5) continue;
+      T_a_b.rotation.normalize();
+    }
+    const Rigid3 rounded = roundedPose(T_a_b);
+    ASSERT_LT(angleBetween(rounded, T_a_b), 4e-12);
+    ASSERT_LT(std::abs(rounded.rotation.norm() - 1), 1e-15);
+    Rigid3 negative = rounded;
+    negative.rotation.coeffs() *= -1;
+    const Eigen::Matrix3d R_a_b = rounded.rotation.toRotationMatrix();
+    const Rigid3 identity;
+    for (const Rigid3& other :
+         {rounded, negative, rounded * identity, rigidFrom(mrptPoseFrom(rounded)),
+          Rigid3{Eigen::Quaterniond(R_a_b), rounded.translation}}) {
+      ASSERT_TRUE(isSame(roundedPose(other), rounded)) << rounded.rotation.coeffs().transpose();
+    }
+  }
+  Rigid3 none;
+  none.rotation.coeffs().setZero();
+  EXPECT_FALSE(roundedPose(none).rotation.coeffs().allFinite());
 }
 
 /// Returns x, y, z, yaw, pitch and roll, in MRPT's order.
@@ -295,8 +322,10 @@ TEST(PoseObservation, ReturnsThePoseAndTheRigOnTheBody) {
       poseIn(poseObservation({{PoseKind::kPose, "pose"}, 1000, T_world_body, T_body_rig}));
   EXPECT_EQ(pose.t_ns, 1000);
   const Eigen::Vector3d point(4, 5, 6);
-  EXPECT_LT((pose.T_world_body * point - T_world_body * point).norm(), 1e-12);
-  EXPECT_LT((pose.T_body_rig * point - T_body_rig * point).norm(), 1e-12);
+  EXPECT_LT((pose.T_world_body * point - T_world_body * point).norm(), 1e-11)
+      << "rotations are rounded to 1e-12";
+  EXPECT_LT((pose.T_body_rig * point - T_body_rig * point).norm(), 1e-11)
+      << "rotations are rounded to 1e-12";
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <future>
 #include <new>
 
+#include "plugin/session/host_text.h"
 #include "test/memory/failing_allocation.h"
 #include "test/plugin/session/mapper_driver.h"
 
@@ -52,6 +53,40 @@ void expectConsistent(const MapSnapshot& map, const GlobalCloudOptions& options)
     cloud.insert(i, pointsInWorld(*keyframe.points, keyframe.T_world_ref), keyframe.T_world_ref);
   }
   EXPECT_TRUE(test::sameBits(*cloud.points(), *map.points));
+}
+
+TEST(HostText, NamesWhatTheHostCalls) {
+  const struct {
+    const char* text;
+    std::vector<std::string> of;  // recordings in C++ and Python, mappers in C++ and Python
+  } kRows[] = {
+      {"no poses: expected poses.txt, or --poses FILE",
+       {"no poses: expected poses.txt, or Overrides::poses=FILE",
+        "no poses: expected poses.txt, or poses=FILE", "no poses: expected poses.txt, or addPose",
+        "no poses: expected poses.txt, or add_poses"}},
+      {"a map needs --calibration",
+       {"a map needs Overrides::calibration", "a map needs calibration=", "a map needs addCamera",
+        "a map needs add_camera"}},
+      {"us: --pose-time-unit us; or (--time-unit)",
+       {"us: Overrides::pose_time_unit=us; or (Overrides::time_unit)",
+        "us: pose_time_unit=us; or (time_unit=)", "us: expected nanoseconds; or (addEvents)",
+        "us: time_unit=us; or (time_unit=)"}},
+      {"(--poses, --set map.voxel_size_m=0.1)",
+       {"(Overrides::poses, Options::set(\"map.voxel_size_m\", \"0.1\"))",
+        "(poses=, options={'map.voxel_size_m': '0.1'})",
+        "(addPose, Options::set(\"map.voxel_size_m\", \"0.1\"))",
+        "(add_poses, options={'map.voxel_size_m': '0.1'})"}},
+      {"stopped by a signal: there is no result",
+       {"stopped: there is no result", "stopped: there is no result", "stopped: there is no result",
+        "stopped: there is no result"}},
+  };
+  for (const auto& row : kRows) {
+    for (std::size_t i = 0; i < row.of.size(); ++i) {
+      hostIsPython() = i % 2 == 1;
+      EXPECT_EQ(hostText(row.text, i < 2 ? HostFace::kRecording : HostFace::kMapper), row.of[i]);
+    }
+  }
+  hostIsPython() = false;
 }
 
 TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsistent) {

@@ -74,6 +74,33 @@ RecordingSurvey surveyOf(const SyntheticRecording& recording, const EventFusionO
   return surveyor.finish();
 }
 
+TEST(FirstLook, TakesTheSameEventsFromPacketsOfAnyLength) {
+  const SyntheticRecording recording(0.5);
+  std::vector<Event> events;  // 2.4 million a second: more than a look takes
+  for (std::uint32_t i = 0; i < 1'200'000; ++i) {
+    const std::int64_t t_ns = SyntheticRecording::kStartNs + std::int64_t{i} * 417;
+    events.push_back({t_ns, std::uint16_t(i % 97 % 64), std::uint16_t(i % 89 % 48), i % 3 == 0});
+  }
+  std::vector<std::vector<WindowSample>> looks;
+  for (const std::size_t length : {std::size_t{9001}, std::size_t{123'457}, events.size()}) {
+    FirstLook look(automaticOptions());
+    for (const StampedPose& pose : recording.poses) look.addPose(sampleOf(pose));
+    for (const int c : {0, 1}) {
+      for (std::size_t first = 0; first < events.size(); first += length) {
+        EventPacket packet{c, packetOf(recording, c).calibration, {}};
+        packet.events.assign(
+            events.begin() + std::ptrdiff_t(first),
+            events.begin() + std::ptrdiff_t(std::min(first + length, events.size())));
+        look.addEvents(packet);
+      }
+    }
+    looks.push_back(look.finish().samples);
+  }
+  ASSERT_EQ(looks[0].size(), 1U);
+  ASSERT_GT(looks[0][0].events[1].size(), 100'000U);
+  for (const auto& look : looks) EXPECT_EQ(look.at(0).events, looks[0][0].events);
+}
+
 TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
   for (const double duration_s : {0.5, 4.2}) {
     const SyntheticRecording recording(duration_s);
@@ -97,6 +124,35 @@ TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
       EXPECT_EQ(status.chosen[i].key, choice.options[i].key);
       EXPECT_EQ(status.chosen[i].value, choice.options[i].value);
       EXPECT_EQ(status.chosen[i].reason, choice.options[i].reason);
+    }
+  }
+}
+
+TEST(MappingSession, AnAutomaticVoxelIsAPixelAtTheMedianDepthAndIsChosenOnce) {
+  const SyntheticRecording recording(4.2);
+  const double pixel_m = SyntheticRecording::kDepthM / packetOf(recording, 0).calibration.model.fx;
+  for (const bool live : {false, true}) {
+    for (const bool has_earlier : {false, true}) {
+      EventFusionOptions options = automaticOptions();
+      options.automatic.voxel_size_m = true;
+      options.live.enabled = live;
+      MappingSession session(options);
+      if (has_earlier) session.insertEarlier({{{0, 0, 1}, 1.0F}}, {});
+      EXPECT_THAT(mapAll(session, recording), Not(IsEmpty()));
+      const double voxel_m = session.cloudOptions().voxel_size_m;
+      EXPECT_EQ(session.cloud().options().voxel_size_m, voxel_m);
+      std::vector<double> chosen_m;
+      for (const ChosenOption& option : session.status().chosen) {
+        if (option.key == "voxel_size_m") chosen_m.push_back(option.value);
+      }
+      if (has_earlier) {  // its points are merged already
+        EXPECT_EQ(voxel_m, GlobalCloudOptions().voxel_size_m);
+        EXPECT_THAT(chosen_m, IsEmpty());
+      } else if (!live) {  // in live operation, the first second shows no scene
+        EXPECT_THAT(chosen_m, testing::ElementsAre(voxel_m));
+        EXPECT_LE(voxel_m, 1.1 * pixel_m) << "rounded down to a digit";
+        EXPECT_GT(voxel_m, 0.45 * pixel_m);
+      }
     }
   }
 }

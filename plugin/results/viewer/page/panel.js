@@ -51,11 +51,12 @@ function showNumbers() {
   addRow("report", "version", report.version);
 
   const doubts = (report.doubtful || []).map((text) => ({ name: "doubtful", text }));
-  const warnings = doubts.concat(report.warnings);
-  element("warning-section").hidden = warnings.length === 0;
-  for (const warning of warnings) {
-    for (const [tag, text] of [["dt", warning.name], ["dd", warning.text]]) {
-      element("warnings").appendChild(document.createElement(tag)).textContent = text;
+  for (const [kind, texts] of [["warning", doubts.concat(report.warnings)], ["note", report.notes || []]]) {
+    element(`${kind}-section`).hidden = texts.length === 0;
+    for (const {name, text} of texts) {
+      for (const [tag, words] of [["dt", name], ["dd", text]]) {
+        element(`${kind}s`).appendChild(document.createElement(tag)).textContent = words;
+      }
     }
   }
   element("chosen-section").hidden = !report.chosen;
