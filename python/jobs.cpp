@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Whole recordings: mapped, evaluated and simulated as the program does.
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -19,6 +18,7 @@
 #include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/recording_info.h"
+#include "plugin/session/host_text.h"
 #include "tracking_stub/presets/presets.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
@@ -86,34 +86,9 @@ struct WindowDsi {
   }
 };
 
-/// Returns the window of all events with poses; given limits stay as they are.
-/// @throws std::runtime_error if there are none.
-TimeLimits wholeWindow(const RecordingSource& source, TimeLimits window) {
-  if (window.t0_ns && window.t1_ns) return window;
-  std::int64_t first_ns = kEndOfTimeNs, last_ns = -kEndOfTimeNs;
-  std::int64_t first_pose_ns = kEndOfTimeNs, last_pose_ns = -kEndOfTimeNs;
-  const auto recording = openRecording(source);
-  while (const auto sample = recording->next()) {
-    checkSignals();
-    if (const auto* pose = std::get_if<PoseSample>(&*sample)) {
-      first_pose_ns = std::min(first_pose_ns, pose->t_ns);
-      last_pose_ns = std::max(last_pose_ns, pose->t_ns);
-    }
-    const auto* packet = std::get_if<EventPacket>(&*sample);
-    if (packet == nullptr || packet->events.empty()) continue;
-    const std::int64_t offset_ns = packet->calibration.time_offset_ns;
-    first_ns = std::min(first_ns, trajectoryTime(packet->events.front().t_ns, offset_ns));
-    last_ns = std::max(last_ns, trajectoryTime(packet->events.back().t_ns, offset_ns));
-  }
-  first_ns = std::max(first_ns, first_pose_ns);
-  last_ns = std::min(last_ns, last_pose_ns);
-  if (first_ns > last_ns) throw std::runtime_error("the recording has no event with poses");
-  return {window.t0_ns.value_or(first_ns), window.t1_ns.value_or(last_ns + 1)};
-}
-
-py::tuple mapDsi(const RecordingSource& source, const Options& options,
-                 std::optional<std::int64_t> t0_ns, std::optional<std::int64_t> t1_ns,
-                 std::optional<std::int64_t> t_ref_ns, const OnProgress& on_progress) {
+py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int64_t t0_ns,
+                 std::int64_t t1_ns, std::optional<std::int64_t> t_ref_ns,
+                 const OnProgress& on_progress) {
   auto dsi = std::make_shared<WindowDsi>();
   std::shared_ptr<const Keyframe> made;
   MapResult result;
@@ -121,8 +96,7 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options,
     const Released released;
     MapJob job = jobOf(source, options, nullptr, on_progress);
     FusionMapperOptions& mapper = job.options.mapper;
-    const TimeLimits window = wholeWindow(job.sourceNow(), {t0_ns, t1_ns});
-    mapper.only_window = windowOf(*window.t0_ns, *window.t1_ns, mapper.policy.reference);
+    mapper.only_window = windowOf(t0_ns, t1_ns, mapper.policy.reference);
     if (t_ref_ns) mapper.only_window->t_ref_ns = *t_ref_ns;
     job.options.mapper.validate();
     job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
@@ -155,8 +129,11 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options,
 }
 
 std::string infoOf(const RecordingSource& source) {
-  const RecordingInfo info = readInfo(source, [](double) { checkSignals(); });
+  RecordingInfo info = readInfo(source, [](double) { checkSignals(); });
   if (info.error) std::rethrow_exception(info.error);
+  for (std::vector<Warning>* const texts : {&info.warnings, &info.notes}) {
+    for (Warning& text : *texts) text.text = hostText(text.text, HostFace::kRecording);
+  }
   return infoJson(info);
 }
 

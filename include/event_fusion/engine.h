@@ -105,7 +105,7 @@ using Keyframe = KeyframeDepthMap;
 /// In playback the caller's thread maps: a call returns when all windows that became complete are
 /// mapped, or throws the first error. The same samples give the same map, bit for bit, on any
 /// number of threads. Automatic options are chosen at `finish`, or when `live.max_queue_mb` of
-/// events wait: nothing is mapped before. If the input makes no keyframe, nothing is thrown:
+/// events wait (then from these events): nothing is mapped before. If the input makes no keyframe, nothing is thrown:
 /// `warnings` says why.
 ///
 /// In live operation (`live.enabled`) a thread of the mapper maps. Adding never waits, and queries
@@ -133,7 +133,9 @@ class Mapper {
   Mapper(const Mapper&) = delete;
   Mapper& operator=(const Mapper&) = delete;
 
-  // Own data. Events and poses of the same time may come in any order.
+  // Own data. Events and poses of the same time may come in any order. In playback all poses, and
+  // the events of one camera after another, may also come at once: up to `live.max_queue_mb` of
+  // events wait for a camera that has none yet.
 
   /// Adds a camera. @return its index, from 0.
   /// @param camera T_rig_cam has a unit quaternion.

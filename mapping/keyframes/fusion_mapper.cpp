@@ -88,8 +88,11 @@ void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked
   const Event ends[] = {events.front(), events.back()};  // the earliest and the latest time
   stream.requireValid(checked ? EventSpan(ends, ends + 2) : EventSpan(events));
   const std::int64_t begin_ns = stream.onTrajectoryClock(events.front().t_ns);
+  // The beginning of packets is compared: during a long packet of another camera, this camera need
+  // not have delivered yet.
   packet_ns_ = std::max(packet_ns_.value_or(begin_ns), begin_ns);
   counts_.sorted_events += stream.add(std::move(events), options_.limits, released_ns_);
+  if (heldEvents() >= options_.max_waiting_events) silent_ns_ = *packet_ns_ - kMaxCameraLagNs;
   const std::int64_t newest_ns = *stream.newestNs();
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
 }
@@ -363,11 +366,7 @@ MapperCounts FusionMapper::counts() const {
 
 /// Returns the time until which a camera's events are complete.
 std::int64_t FusionMapper::completeUntil(const CameraStream& camera) const {
-  if (finished_) return kMaxTimeNs;
-  // The beginning of packets is compared: during a long packet of another camera, this camera need
-  // not have delivered yet.
-  const std::int64_t silent_ns = packet_ns_ ? *packet_ns_ - kMaxCameraLagNs : kMinTimeNs;
-  return std::max(camera.completeNs(), silent_ns);
+  return finished_ ? kMaxTimeNs : std::max(camera.completeNs(), silent_ns_);
 }
 
 std::int64_t FusionMapper::eventsCompleteNs() const {

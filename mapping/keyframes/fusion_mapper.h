@@ -36,6 +36,8 @@ struct FusionMapperOptions {
   std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.
   TimeLimits limits;         ///< Events and windows outside the limits are not used.
   EventFilterOptions filter;
+  /// As long as fewer events are held, a silent camera delays the others: it may deliver later.
+  std::size_t max_waiting_events = 0;
 
   /// Returns the time interval of the events that are used.
   TimeLimits interval() const {
@@ -81,7 +83,8 @@ class FusionMapper : private RecordingProgress {
   /// Declares that all of a camera's events before `t_ns` (its own clock) have been added, so that
   /// a camera without events does not delay other cameras. Without this call, a camera's events are
   /// complete until 10 ms before its newest event. A camera is silent if it has no event in the
-  /// last second before the newest packet of any camera begins. A silent camera delays no other.
+  /// last second before the newest packet of any camera begins. A silent camera delays no other,
+  /// but see `max_waiting_events`.
   void setCompleteUntil(int camera, std::int64_t t_ns) {
     cameras_.at(static_cast<std::size_t>(camera)).setCompleteUntil(t_ns);
   }
@@ -178,6 +181,7 @@ class FusionMapper : private RecordingProgress {
   std::optional<std::int64_t> start_ns_;    // first event with a pose
   std::optional<std::int64_t> reached_ns_;  // newest event of any camera, selected or not
   std::optional<std::int64_t> packet_ns_;   // first event of the newest packet of any camera
+  std::int64_t silent_ns_ = kMinTimeNs;     // no camera delays the others before this time
   std::int64_t released_ns_ = kMinTimeNs;   // earlier events are counted and released
   bool finished_ = false;
   std::optional<Window> failed_;  // `next` began to map it and threw

@@ -276,8 +276,9 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
   std::optional<double> voxel_m;
   if (automatic.voxel_size_m && !depths.inverse.empty()) {
     const double median_m = 1 / depths.median();
-    const double rounded_m = roundedDown(median_m / viewOf(rig, options).fx, 1);
-    voxel_m = std::round(std::clamp(rounded_m, 1e-6, 1000.0) * 1e6) / 1e6;  // its digits alone
+    NumberText digit(1);
+    digit << std::clamp(median_m / viewOf(rig, options).fx, 1e-6, 1000.0);
+    voxel_m = std::stod(digit.str());
     choice.voxel(*voxel_m, "a pixel at the median depth, " + number(median_m) + " m");
   }
   return {choice.take(), true, parallax_px_m, is_proven, voxel_m};

@@ -100,7 +100,7 @@ std::optional<PoseSample> poseIn(const mrpt::obs::CObservation& observation) {
                       {}};
   }
   return PoseSample{*poseSourceOf(observation), t_ns, roundedPose(rigidFrom(robot->pose.mean)),
-                    roundedPose(rigidFrom(robot->sensorPose)).inverse(), noiseOf(robot->pose)};
+                    roundedMount(rigidFrom(robot->sensorPose).inverse()), noiseOf(robot->pose)};
 }
 
 mrpt::obs::CObservation::Ptr poseObservation(const PoseSample& pose) {

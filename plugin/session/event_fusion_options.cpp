@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "maps/cloud/keyframe_cloud.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
@@ -12,8 +13,8 @@ RigSetup readRigSetup(const RigOptions& options) {
   RigSetup setup;
   if (!options.calibration.empty()) setup.calibration = readCalibration(options.calibration);
   if (!options.hand_eye.empty()) {
-    setup.T_body_rig =
-        readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr);
+    setup.T_body_rig = roundedMount(
+        readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr));
   }
   return setup;
 }
@@ -33,7 +34,12 @@ std::size_t EventFusionOptions::movableKeyframes() const {
 FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   FusionMapperOptions mapper = options.mapper;
   if (options.late_fusion) mapper.keyframe.camera_maps = true;
-  if (options.live.enabled) mapper.fill_last_window = false;
+  if (options.live.enabled) {
+    mapper.fill_last_window = false;
+  } else {  // in playback, the cameras may come one after another
+    mapper.max_waiting_events =
+        static_cast<std::size_t>(options.live.max_queue_mb * 1e6 / sizeof(Event));
+  }
   if (!options.automatic.any()) return mapper;
   mapper = surveyOptions(mapper, kFirstWindowS);
   mapper.policy.stride_s = kFirstStrideS;

@@ -102,7 +102,7 @@ double eventRate(const WindowData& data) {
 FirstLook::FirstLook(const EventFusionOptions& options)
     : rig_(options),
       pose_source_(options.rig.pose_source),
-      mapper_(surveyOptions(options.mapper, kWindowS)) {}
+      mapper_(surveyOptions(mapperOptions(options), kWindowS)) {}
 
 void FirstLook::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
@@ -226,9 +226,10 @@ RecordingSurvey FirstLook::finish() {
   try {
     for (auto& [camera, waiting] : waiting_) addPeriods(waiting.packet, kMaxTimeNs);
     usePoses(pose_source_.select());
-    mapper_.finish();
     completeRig();
     rig_.requireNoneWaits();
+    takeWindows();
+    mapper_.finish();
     if (samples_.samples().empty()) {
       if (const std::optional<WindowData> rest = mapper_.window()) keep(*rest);
     }

@@ -230,7 +230,6 @@ void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
     nearest_ += depth_m <= near_m ? 1 : 0;
     farthest_ += depth_m >= far_m ? 1 : 0;
   }
-  depths_ += depths_m.size();
   compareWithLast(keyframe);
   last_ = {};
   last_.map.depth = keyframe.map.depth;
@@ -240,8 +239,8 @@ void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
   if (!depths_m.empty()) {
     const double middle_m = upperMedian(depths_m);
     parallaxes_px_.push_back(keyframe.parallax_px_m / middle_m);
-    pixels_m_.push_back(middle_m / keyframe.view.fx);
   }
+  sizes_.add(std::move(depths_m), keyframe.view.fx);
 }
 
 /// Projects the points of the last keyframe into this keyframe, and compares depths.
@@ -306,32 +305,45 @@ std::vector<std::string> DepthStatistics::doubts() const {
   return doubts;
 }
 
+namespace {
+constexpr std::uint64_t kMinDepths = 100;  // fewer tell nothing about the scene
+}
+
+void PixelSizes::add(std::vector<float> depths_m, double fx) {
+  depths += depths_m.size();
+  if (!depths_m.empty()) at_median_m.push_back(upperMedian(depths_m) / fx);
+}
+
+std::optional<Warning> PixelSizes::warning(double voxel_m) const {
+  // HD at 1 m: 0.11. A car with 346 x 260 pixels at 20 m: 9.
+  constexpr double kMin = 0.1;  // of a voxel
+  constexpr double kMax = 20;
+  if (depths < kMinDepths) return std::nullopt;
+  std::vector<double> sizes_m = at_median_m;
+  const double pixel_m = upperMedian(sizes_m);
+  if (pixel_m >= kMin * voxel_m && pixel_m <= kMax * voxel_m) return std::nullopt;
+  return Warning{
+      "voxel-size",
+      fmt::format("a pixel at the median depth is {:.1g} m wide, a voxel of the map {:g} m: {}; "
+                  "--set map.voxel_size_m={:.1g} fits the scene (are the positions in metres?)",
+                  pixel_m, voxel_m,
+                  pixel_m < voxel_m ? "details are lost" : "points of one place are not merged",
+                  pixel_m)};
+}
+
 std::vector<Warning> DepthStatistics::warnings(std::optional<double> voxel_size_m) const {
   // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: at most 2.4 % with
   // limits around the scene; 7 to 74 % in eight of ten cases with much of the scene beyond a limit.
   // The fraction is not larger because most pixels without a peak inside the limits are rejected.
   constexpr double kMaxFraction = 0.06;
-  constexpr std::uint64_t kMinDepths = 100;  // fewer may be at a limit by chance
-  constexpr int kMinPlanes = 50;             // with fewer, the limit's own plane has many depths
-  // HD at 1 m: 0.11. A car with 346 x 260 pixels at 20 m: 9.
-  constexpr double kMinPixel = 0.1;  // of a voxel
-  constexpr double kMaxPixel = 20;
+  constexpr int kMinPlanes = 50;  // with fewer, the limit's own plane has many depths
   Warnings warnings;
-  std::vector<double> pixels_m = pixels_m_;
-  const double voxel_m = voxel_size_m.value_or(0);
-  const double pixel_m = pixels_m.empty() ? voxel_m : upperMedian(pixels_m);
-  if (depths_ >= kMinDepths && voxel_size_m &&
-      (pixel_m < kMinPixel * voxel_m || pixel_m > kMaxPixel * voxel_m)) {
-    addWarning(warnings, "voxel-size",
-               "a pixel at the median depth is {:.1g} m wide, a voxel of the map {:g} m: {}; "
-               "--set map.voxel_size_m={:.1g} fits the scene (are the positions in metres?)",
-               pixel_m, voxel_m,
-               pixel_m < voxel_m ? "details are lost" : "points of one place are not merged",
-               pixel_m);
+  if (voxel_size_m) {
+    if (auto warning = sizes_.warning(*voxel_size_m)) warnings.push_back(std::move(*warning));
   }
-  if (depths_ < kMinDepths || planes_.num_planes < kMinPlanes) return warnings;
+  if (sizes_.depths < kMinDepths || planes_.num_planes < kMinPlanes) return warnings;
   const auto check = [&](std::uint64_t count, const char* which, double limit_m, const char* key) {
-    const double fraction = static_cast<double>(count) / static_cast<double>(depths_);
+    const double fraction = static_cast<double>(count) / static_cast<double>(sizes_.depths);
     if (fraction <= kMaxFraction) return;
     const auto chosen = std::find_if(chosen_.begin(), chosen_.end(),
                                      [&](const ChosenOption& option) { return option.key == key; });

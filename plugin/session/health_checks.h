@@ -40,6 +40,16 @@ Eigen::Vector2d fieldOfView(const CameraModel& model);
 /// Returns the distance of two cameras on the rig, metres.
 double baselineOf(const RigCamera& a, const RigCamera& b);
 
+/// Depths of keyframes, to compare the pixels with the voxels of the map.
+struct PixelSizes {
+  std::vector<double> at_median_m;  ///< Size of a pixel at the median depth of each keyframe.
+  std::uint64_t depths = 0;
+
+  void add(std::vector<float> depths_m, double fx);
+  /// Returns `voxel-size` if the voxels do not fit the scene.
+  std::optional<Warning> warning(double voxel_m) const;
+};
+
 /// Counts the pixels of keyframes by their result, and depths near the limits.
 class DepthStatistics {
  public:
@@ -65,8 +75,7 @@ class DepthStatistics {
   std::uint64_t shared_ = 0;           // points that two consecutive keyframes have
   std::uint64_t agreeing_ = 0;         // shared points with the same depth
   std::vector<double> parallaxes_px_;  // of each keyframe, at its median depth
-  std::vector<double> pixels_m_;       // size of a pixel there
-  std::uint64_t depths_ = 0;
+  PixelSizes sizes_;
   std::uint64_t nearest_ = 0;   // depths near the nearest plane
   std::uint64_t farthest_ = 0;  // depths near the farthest plane
 };

@@ -47,16 +47,23 @@ std::string hostText(const std::string& text, HostFace face) {
                            const std::string& by) {
     return std::regex_replace(in, std::regex(pattern), by);
   };
-  std::string named = replaced(text, "--set ([a-z_]+\\.[a-z_]+)=([^\\s);,]+)",
-                               python ? "options={'$1': '$2'}" : "Options::set(\"$1\", \"$2\")");
-  named = replaced(named, "--sensor-size ([0-9A-Z]+)x([0-9A-Z]+)",
+  std::string named = replaced(  // a command whose option is the choice of cameras
+      text, "`map --calibration \\S+ --set rig\\.cameras=([0-9,]+)` \\(Python: [^)]*\\)",
+      python ? "cameras=[$1]" : "Overrides::cameras={$1}");
+  if (face == HostFace::kMapper) {  // which knows no unit of a file
+    named = replaced(named,
+                     "they fit if the (?:events'|poses') times are in .*--time-unit\\)|"
+                     "they fit if the (?:events'|poses') times are in \\S+: --time-unit \\S+",
+                     python ? "they fit with another unit of time: is time_unit= right for both?"
+                            : "they fit with another unit of time: are both in nanoseconds?");
+  }
+  named = replaced(named, "--set ([a-z_]+\\.[a-z_]+)=((?:[^\\s);,`]|,(?=[-0-9]))*)",
+                   python ? "options={'$1': '$2'}" : "Options::set(\"$1\", \"$2\")");
+  named = replaced(named, "--sensor-size (-?[0-9A-Z]+)x(-?[0-9A-Z]+)",
                    python ? "sensor_size=($1, $2)" : "Overrides::sensor_size={$1, $2}");
   if (!python) named = replaced(named, ", (one of an earlier \\w+), or --force", ", or $1");
   named = replaced(named, ", or --force(?: to replace it)?", python ? ", or force=True" : "");
   named = replaced(named, "stopped by a signal", "stopped");
-  if (face == HostFace::kMapper && !python) {
-    named = replaced(named, "--(?:pose-)?time-unit [mun]?s\\b", "expected nanoseconds");
-  }
   for (const OptionWords& row : kOptions) {
     const char* const word = row.words[(face == HostFace::kMapper ? 2U : 0U) + (python ? 1U : 0U)];
     const bool takes_value = std::string(word).back() == '=';
@@ -67,7 +74,11 @@ std::string hostText(const std::string& text, HostFace face) {
     named = replaced(named, option + "(?![a-z-])",
                      is_member ? std::string(word).substr(0, std::strlen(word) - 1) : word);
   }
-  return named;
+  if (!python) return named;
+  named = replaced(named, "--align ([a-z0-9]+)", "alignment='$1'");
+  named = replaced(named, "--(align|config)\\b", "$1=");
+  named = replaced(named, "event-fusion info", "Recording.info()");
+  return replaced(named, "time_unit=([mun]?s)\\b", "time_unit='$1'");
 }
 
 }  // namespace efm

@@ -59,6 +59,7 @@ std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return core_->new
 SessionStatus Mapper::status() const {
   SessionStatus status = core_->status();
   status.pose_warnings = forHost(std::move(status.pose_warnings));
+  status.pose_notes = forHost(std::move(status.pose_notes));
   if (status.live) status.live->last_error = hostText(status.live->last_error, kFace);
   return status;
 }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -29,6 +30,13 @@ std::string errorText() {
 EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const RigSetup> setup) {
   options.rig.setup = std::move(setup);
   return options;
+}
+
+std::vector<float> depthsIn(const cv::Mat1f& depth) {
+  std::vector<float> depths_m;
+  std::copy_if(depth.begin(), depth.end(), std::back_inserter(depths_m),
+               [](float depth_m) { return depth_m > 0; });
+  return depths_m;
 }
 
 /// Returns why an ended input made no keyframe. @return std::nullopt if it made one.
@@ -148,11 +156,17 @@ std::vector<Warning> MapperCore::warnings() {
   findings.options = &options;
   std::vector<Warning> warnings = warningsOf(findings);
   double reach_m = 4 * options.keyframe.planes.max_depth_m;  // of points around the keyframes
-  for (const StampedPose& pose : newest(false)->trajectory) {
+  const auto map = newest(false);
+  for (const StampedPose& pose : map->trajectory) {
     reach_m = std::max(reach_m, pose.T_world_rig.translation.cwiseAbs().maxCoeff() +
                                     4 * options.keyframe.planes.max_depth_m);
   }
   const double voxel_size_m = cloudOptions().voxel_size_m;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    auto warning = ended ? pixel_sizes_.warning(voxel_size_m) : std::nullopt;
+    if (warning) warnings.push_back(std::move(*warning));
+  }
   if (ended && coarseStepAt(reach_m, voxel_size_m)) {  // only then is the map exported
     if (auto far = farPointsWarning(*newest(true)->points, voxel_size_m)) {
       warnings.push_back(std::move(*far));
@@ -184,7 +198,8 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
     warn(warning->name + ": " + warning->text, error);
   }
   for (const Warning& warning : warnings()) {
-    if (warning.name == "poses-blur" || warning.name == "far-coordinates")
+    if (warning.name == "poses-blur" || warning.name == "far-coordinates" ||
+        warning.name == "voxel-size")
       warn(warning.name + ": " + warning.text, error);
   }
 }
@@ -390,6 +405,7 @@ bool MapperCore::mapNext(std::exception_ptr& error) {
       forgetOldest();
       const std::lock_guard<std::mutex> published(mutex_);
       newest_depth_ = keyframe->map.depth;
+      pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
       newest_planes_ = session_.chosen().planes;
     }
   }

@@ -22,6 +22,7 @@
 #include "event_fusion/engine.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/session/health_checks.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 #include "plugin/session/recording_statistics.h"
@@ -175,6 +176,7 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
   SessionStatus status_;
+  PixelSizes pixel_sizes_;            // under mutex_
   FusionMapperOptions used_options_;  // in live operation: with the chosen options
   LiveStatus live_;
   std::shared_ptr<const MapSnapshot> map_;

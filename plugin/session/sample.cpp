@@ -21,12 +21,24 @@ std::int64_t nearestTick(std::int64_t t_ns) {
   return ticks * kTickNs;
 }
 
+namespace {
+
+constexpr double kSteps = 1099511627776.0;  // 2^40: of 1
+
+double onGrid(double value) { return std::round(value * kSteps) / kSteps + 0.0; }  // not -0
+
+}  // namespace
+
+Rigid3 roundedMount(const Rigid3& T_body_rig) {
+  Rigid3 mount = roundedPose(T_body_rig);
+  for (double& component : mount.translation) component = onGrid(component);
+  return mount;
+}
+
 Rigid3 roundedPose(const Rigid3& T_a_b) {
-  constexpr double kSteps = 1099511627776.0;  // 2^40: of 1
   // One component is at least 0.5, so one is found. Special rotations have no component near this
   // bound, so that the last digits do not decide which one it is.
   constexpr double kLarge = 0.4321;
-  Rigid3 rounded = T_a_b;
   Eigen::Vector4d q(T_a_b.rotation.w(), T_a_b.rotation.x(), T_a_b.rotation.y(), T_a_b.rotation.z());
   q /= q.norm();  // 0 becomes NaN, which is rejected later
   int large = 0;
@@ -35,12 +47,11 @@ Rigid3 roundedPose(const Rigid3& T_a_b) {
   double rest = 1;
   for (int i = 0; i < 4; ++i) {
     if (i == large) continue;
-    q[i] = std::round(q[i] * kSteps) / kSteps + 0.0;  // not -0
+    q[i] = onGrid(q[i]);
     rest -= q[i] * q[i];
   }
   q[large] = std::sqrt(rest);
-  rounded.rotation = {q[0], q[1], q[2], q[3]};
-  return rounded;
+  return {{q[0], q[1], q[2], q[3]}, T_a_b.translation};
 }
 
 Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {

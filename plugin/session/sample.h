@@ -75,6 +75,9 @@ std::int64_t nearestTick(std::int64_t t_ns);
 /// quaternion again, as in MRPT's classes and NumPy, differs in its last digits; rounded, it is the
 /// same. So a recording gives the same map, bit for bit, as text, as a rawlog and through a host.
 Rigid3 roundedPose(const Rigid3& T_a_b);
+/// Returns the pose of a rig on its body with a rounded translation, too (multiples of 2^-40 m): it
+/// is the same after it was inverted and inverted again.
+Rigid3 roundedMount(const Rigid3& T_body_rig);
 
 /// A topic of a bag. Its messages were recorded between two times: those of the bag's chunks.
 struct RecordedTopic {

@@ -226,18 +226,28 @@ def engine_options(options: Options | None) -> _engine.Options:
 
 
 class _Percentage:
-    """A line with the progress and the time that remains, where tqdm is not installed."""
+    """The progress and the time that remains, where tqdm is not installed: a line, ten lines in a file."""
 
     def __init__(self, total: float, desc: str, **_: object) -> None:
-        self.n, self.desc, self._total, self._begin = 0.0, desc, total, monotonic()
+        self.n, self.desc, self._total, self._begin, self._next = 0.0, desc, total, monotonic(), 0.01
+        self._terminal = bool(getattr(sys.stderr, "isatty", bool)())
 
     def update(self, more: float) -> None:
         self.n += more
-        left = (monotonic() - self._begin) * (self._total / self.n - 1) if self.n > 0 else 0
-        print(f"\r{self.desc}: {self.n / self._total:4.0%}, {left:.0f} s left ", end="", file=sys.stderr, flush=True)
+        done = self.n / self._total
+        if done < (0.01 if self._terminal else self._next):
+            return
+        self._next = int(10 * done) / 10 + 0.1
+        self._print(f"{self.desc}: {done:.0%}, {(monotonic() - self._begin) * (1 / done - 1):.0f} s left ")
 
     def close(self) -> None:
-        print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
+        if self._terminal:
+            self._print(" " * 60)
+            self._print("")
+
+    def _print(self, text: str) -> None:
+        if sys.stderr is not None:
+            print(f"\r{text}" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
 
 
 class ProgressBar:

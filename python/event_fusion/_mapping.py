@@ -162,7 +162,7 @@ class Mapper:
         """Add poses in the order of time: times (n,) in a unit, and matrices (n, 4, 4) or rows (n, 7)."""
         times, poses = column_of("t", t), np.asarray(column_of("T_world_rig", T_world_rig), float)
         factor = ns_per(time_unit)
-        if len(times) == 0 and len(poses) == 0:
+        if times.ndim == 1 and len(times) == 0 and len(poses) == 0:
             return
         if times.dtype.kind not in "iuf" or times.ndim != 1 or (time_unit == "ns" and times.dtype.kind == "f"):
             raise TypeError(f"t: {times.dtype} of shape {times.shape}: expected nanoseconds, as ints, or time_unit=")
@@ -473,6 +473,20 @@ class Dsi(tuple):  # type: ignore[type-arg]
         return depths
 
 
+def _span(recording: Recording) -> tuple[int, int]:
+    """Return the times of the first and the last event with poses."""
+    info = recording.info()
+    of_poses = [(of["first_ns"], of["last_ns"]) for of in info["poses"] if of["used"]]
+    of_events = [
+        (of["first_ns"] + camera.time_offset_ns, of["last_ns"] + camera.time_offset_ns)
+        for of, camera in zip(info["cameras"], recording.rig)
+        if of["events"] > 0
+    ]
+    if not of_poses or not of_events:
+        raise OSError(f"{', '.join(recording.files)}: expected events and poses")
+    return max(min(of_events)[0], of_poses[0][0]), min(max(last for _, last in of_events), of_poses[0][1])
+
+
 def dsi(
     recording: Recording | Path,
     t0: int | str | None = None,
@@ -489,7 +503,8 @@ def dsi(
     recording : Recording or path
         See `open`.
     t0, t1 : int or str
-        The window [t0, t1): nanoseconds, or text as in `open`. By default the first and the last event with poses.
+        The window [t0, t1): nanoseconds, or text as in `open`. By default the first and the last event with poses, by
+        the time offsets of the recording's calibration.
     options : mapping or path
         See `map`.
     t_ref : int or str
@@ -504,8 +519,12 @@ def dsi(
     OSError
         If the recording cannot be read, or the window has no keyframe.
     """
-    source = _opened(recording)._source
+    opened = _opened(recording)
+    source = opened._source
     t0_ns, t1_ns, t_ref_ns = times_in(source, t0=t0, t1=t1, t_ref=t_ref)
+    if t0_ns is None or t1_ns is None:
+        first_ns, last_ns = _span(opened)
+        t0_ns, t1_ns = first_ns if t0_ns is None else t0_ns, last_ns + 1 if t1_ns is None else t1_ns
     checked = engine_options(options)
     with ProgressBar(progress) as on_progress:
         values, depths, keyframe, contrast = _engine.run_dsi(source, checked, t0_ns, t1_ns, t_ref_ns, on_progress)

@@ -16,6 +16,7 @@
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/pose_conflict.h"
+#include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
@@ -32,7 +33,8 @@ const RecordingFormat* formatNamed(const std::string& name) {
   for (const RecordingFormat& format : readerFormats()) {
     if (format.name == name) return &format;
   }
-  throw std::runtime_error("'" + name + "' is not a known format");
+  throw std::invalid_argument(fmt::format("'{}' is not a known format: expected one of {}", name,
+                                          fmt::join(recordingFormats(), ", ")));
 }
 
 [[noreturn]] void rejectUnknown(const Path& path) {
@@ -416,9 +418,8 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const RecordingSource& so
     samples = withFaults(std::move(samples), source.faults, setup.T_body_rig, rig);
   }
   if (source.override_rig && setup.T_body_rig) {
-    const Rigid3 T_body_rig = roundedPose(setup.T_body_rig->inverse()).inverse();
     for (PoseSample& sample : samples) {
-      if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = T_body_rig;
+      if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = *setup.T_body_rig;
     }
   }
   return samples;
@@ -460,6 +461,12 @@ RigSetup readRigSetup(const RecordingSource& source) {
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
+  for (const auto& [name, unit] : {std::pair("time_unit", source.reader.time_unit),
+                                   std::pair("pose_time_unit", source.reader.pose_time_unit)}) {
+    if (unit.empty() || timeExponentOf(unit)) continue;
+    throw std::invalid_argument(
+        fmt::format("{} = '{}': expected one of s, ms, us, ns", name, unit));
+  }
   requireGivenFile(source.poses, "--poses", {});
   RigSetup setup = readRigSetup(source);
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");

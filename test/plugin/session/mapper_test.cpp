@@ -67,10 +67,23 @@ TEST(HostText, NamesWhatTheHostCalls) {
       {"a map needs --calibration",
        {"a map needs Overrides::calibration", "a map needs calibration=", "a map needs addCamera",
         "a map needs add_camera"}},
-      {"us: --pose-time-unit us; or (--time-unit)",
-       {"us: Overrides::pose_time_unit=us; or (Overrides::time_unit)",
-        "us: pose_time_unit=us; or (time_unit=)", "us: expected nanoseconds; or (addEvents)",
-        "us: time_unit=us; or (time_unit=)"}},
+      {"they fit if the poses' times are in us: --pose-time-unit us; or the events' times are in a "
+       "larger unit (--time-unit) (--poses)",
+       {"they fit if the poses' times are in us: Overrides::pose_time_unit=us; or the events' "
+        "times "
+        "are in a larger unit (Overrides::time_unit) (Overrides::poses)",
+        "they fit if the poses' times are in us: pose_time_unit='us'; or the events' times are in "
+        "a "
+        "larger unit (time_unit=) (poses=)",
+        "they fit with another unit of time: are both in nanoseconds? (addPose)",
+        "they fit with another unit of time: is time_unit= right for both? (add_poses)"}},
+      {"--set rig.time_offsets_s=0.1,-0.1, or --set rig.calibration= keeps it",
+       {"Options::set(\"rig.time_offsets_s\", \"0.1,-0.1\"), or Options::set(\"rig.calibration\", "
+        "\"\") keeps it",
+        "options={'rig.time_offsets_s': '0.1,-0.1'}, or options={'rig.calibration': ''} keeps it",
+        "Options::set(\"rig.time_offsets_s\", \"0.1,-0.1\"), or Options::set(\"rig.calibration\", "
+        "\"\") keeps it",
+        "options={'rig.time_offsets_s': '0.1,-0.1'}, or options={'rig.calibration': ''} keeps it"}},
       {"(--poses, --set map.voxel_size_m=0.1)",
        {"(Overrides::poses, Options::set(\"map.voxel_size_m\", \"0.1\"))",
         "(poses=, options={'map.voxel_size_m': '0.1'})",
