@@ -131,9 +131,8 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
 std::string infoOf(const RecordingSource& source) {
   RecordingInfo info = readInfo(source, [](double) { checkSignals(); });
   if (info.error) std::rethrow_exception(info.error);
-  for (std::vector<Warning>* const texts : {&info.warnings, &info.notes}) {
-    for (Warning& text : *texts) text.text = hostText(text.text, HostFace::kRecording);
-  }
+  info.warnings = hostTexts(std::move(info.warnings), HostFace::kRecording);
+  info.notes = hostTexts(std::move(info.notes), HostFace::kRecording);
   return infoJson(info);
 }
 

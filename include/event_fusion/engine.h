@@ -105,8 +105,8 @@ using Keyframe = KeyframeDepthMap;
 /// In playback the caller's thread maps: a call returns when all windows that became complete are
 /// mapped, or throws the first error. The same samples give the same map, bit for bit, on any
 /// number of threads. Automatic options are chosen at `finish`, or when `live.max_queue_mb` of
-/// events wait (then from these events): nothing is mapped before. If the input makes no keyframe, nothing is thrown:
-/// `warnings` says why.
+/// events wait (then from these events): nothing is mapped before. If the input makes no keyframe,
+/// nothing is thrown: `warnings` says why.
 ///
 /// In live operation (`live.enabled`) a thread of the mapper maps. Adding never waits, and queries
 /// return the newest published state. If too much input waits, the oldest windows are dropped.

@@ -599,12 +599,10 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
     return made;
   });
   MapReport& report = result.report;
-  for (Warning& warning : report.warnings) {
-    warning.text = hostText(warning.text, HostFace::kRecording);
-  }
-  std::string json = reportJson(report);
-  return {report.counts.keyframes, report.points, std::move(report.warnings),
-          std::move(report.doubts), std::move(json)};
+  std::string json = reportJson(report);  // as the file, with the program's options
+  return {report.counts.keyframes, report.points,
+          hostTexts(std::move(report.warnings), HostFace::kRecording), std::move(report.doubts),
+          std::move(json)};
 }
 
 }  // namespace efm

@@ -21,8 +21,6 @@ constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 /// Events are subsampled in periods of this grid, so that the choice does not depend on packets.
 constexpr std::int64_t kPeriodNs = 10'000'000;
-/// Events may come this much later than a newer one.
-constexpr std::int64_t kMaxDelayNs = 10'000'000;
 
 std::int64_t periodOf(std::int64_t t_ns) {
   return t_ns / kPeriodNs - (t_ns % kPeriodNs < 0 ? 1 : 0);
@@ -112,7 +110,8 @@ void FirstLook::addEvents(const EventPacket& packet) {
     requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
     const auto [oldest, newest] =
         std::minmax_element(packet.events.begin(), packet.events.end(), isEarlier);
-    if (oldest->t_ns < waiting.newest_ns - kMaxDelayNs) reject(*oldest, packet.camera, "too old");
+    if (oldest->t_ns < waiting.newest_ns - kMaxEventDelayNs)
+      reject(*oldest, packet.camera, "too old");
     if (newest->t_ns > kEndOfTimeNs) reject(*newest, packet.camera, "beyond all times");
   }
   const std::vector<Event> earlier = std::move(waiting.packet.events);
@@ -123,7 +122,7 @@ void FirstLook::addEvents(const EventPacket& packet) {
     std::stable_sort(events.begin(), events.end(), isEarlier);
   }
   if (!events.empty()) waiting.newest_ns = std::max(waiting.newest_ns, events.back().t_ns);
-  addPeriods(waiting.packet, std::max(waiting.newest_ns - kMaxDelayNs,
+  addPeriods(waiting.packet, std::max(waiting.newest_ns - kMaxEventDelayNs,
                                       packet.covered_until_ns.value_or(-kEndOfTimeNs)));
   const bool begins =
       !packet.events.empty() &&

@@ -146,6 +146,8 @@ void checkDepths(const Findings& findings, Warnings& warnings) {
                   [](const Warning& warning) { return warning.name == "focal-length"; });
   const auto voxel_m = wrong_pixels ? std::nullopt : std::optional(findings.voxel_size_m);
   if (findings.depths) append(warnings, findings.depths->warnings(voxel_m));
+  if (!findings.pixels || !voxel_m) return;
+  if (auto warning = findings.pixels->warning(*voxel_m)) warnings.push_back(std::move(*warning));
 }
 
 void checkReading(const Findings& findings, Warnings& warnings) {

@@ -93,7 +93,8 @@ struct Findings {
   const SessionStatus* session = nullptr;
   const FusionMapperOptions* options = nullptr;
   const DepthStatistics* depths = nullptr;
-  double voxel_size_m = 0.01;  ///< Of the map.
+  const PixelSizes* pixels = nullptr;  ///< If `depths` are not known.
+  double voxel_size_m = 0.01;          ///< Of the map.
 
   /// Takes the depth limits of a map.
   void use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);

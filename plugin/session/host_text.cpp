@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstring>
 #include <regex>
+#include <utility>
 
 namespace efm {
 namespace {
@@ -79,6 +80,11 @@ std::string hostText(const std::string& text, HostFace face) {
   named = replaced(named, "--(align|config)\\b", "$1=");
   named = replaced(named, "event-fusion info", "Recording.info()");
   return replaced(named, "time_unit=([mun]?s)\\b", "time_unit='$1'");
+}
+
+std::vector<Warning> hostTexts(std::vector<Warning> warnings, HostFace face) {
+  for (Warning& warning : warnings) warning.text = hostText(warning.text, face);
+  return warnings;
 }
 
 }  // namespace efm

@@ -3,6 +3,9 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include "mapping/base/text.h"
 
 namespace efm {
 
@@ -15,6 +18,8 @@ bool& hostIsPython();
 /// Returns a text for a host: `--set map.voxel_size_m=0.1` becomes
 /// `Options::set("map.voxel_size_m", "0.1")`, and `--poses` the argument or the call that it is.
 std::string hostText(const std::string& text, HostFace face);
+/// Returns warnings with such texts.
+std::vector<Warning> hostTexts(std::vector<Warning> warnings, HostFace face);
 
 template <typename Error>
 [[noreturn]] void rethrowForHost(const Error& error, HostFace face) {

@@ -18,11 +18,6 @@ Mapper::Callbacks forHost(Mapper::Callbacks callbacks) {
   return callbacks;
 }
 
-std::vector<Warning> forHost(std::vector<Warning> warnings) {
-  for (Warning& warning : warnings) warning.text = hostText(warning.text, kFace);
-  return warnings;
-}
-
 }  // namespace
 
 Mapper::Mapper(const Options& options, Callbacks callbacks,
@@ -58,11 +53,11 @@ std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return core_->newe
 std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return core_->newest(false); }
 SessionStatus Mapper::status() const {
   SessionStatus status = core_->status();
-  status.pose_warnings = forHost(std::move(status.pose_warnings));
-  status.pose_notes = forHost(std::move(status.pose_notes));
+  status.pose_warnings = hostTexts(std::move(status.pose_warnings), kFace);
+  status.pose_notes = hostTexts(std::move(status.pose_notes), kFace);
   if (status.live) status.live->last_error = hostText(status.live->last_error, kFace);
   return status;
 }
-std::vector<Warning> Mapper::warnings() const { return forHost(core_->warnings()); }
+std::vector<Warning> Mapper::warnings() const { return hostTexts(core_->warnings(), kFace); }
 
 }  // namespace efm

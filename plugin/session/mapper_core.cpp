@@ -65,6 +65,7 @@ MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
   queue_ = std::make_unique<InputQueue>(options_);
   status_ = session_.status();
   used_options_ = session_.usedOptions();
+  used_cloud_ = session_.cloudOptions();
   map_ = makeSnapshot(true);
   thread_ = std::thread([this] {  // waits: no input before the constructor returns
     worker_ = std::this_thread::get_id();
@@ -137,9 +138,11 @@ void MapperCore::announce(EventPacket packet) {
 
 std::vector<Warning> MapperCore::warnings() {
   bool ended = false;
+  PixelSizes pixels;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ended = ended_;
+    pixels = pixel_sizes_;
   }
   const FusionMapperOptions options = usedOptions();
   const SessionStatus state = status();
@@ -154,6 +157,8 @@ std::vector<Warning> MapperCore::warnings() {
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
   findings.session = &state;
   findings.options = &options;
+  findings.voxel_size_m = cloudOptions().voxel_size_m;
+  if (ended) findings.pixels = &pixels;
   std::vector<Warning> warnings = warningsOf(findings);
   double reach_m = 4 * options.keyframe.planes.max_depth_m;  // of points around the keyframes
   const auto map = newest(false);
@@ -161,14 +166,8 @@ std::vector<Warning> MapperCore::warnings() {
     reach_m = std::max(reach_m, pose.T_world_rig.translation.cwiseAbs().maxCoeff() +
                                     4 * options.keyframe.planes.max_depth_m);
   }
-  const double voxel_size_m = cloudOptions().voxel_size_m;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    auto warning = ended ? pixel_sizes_.warning(voxel_size_m) : std::nullopt;
-    if (warning) warnings.push_back(std::move(*warning));
-  }
-  if (ended && coarseStepAt(reach_m, voxel_size_m)) {  // only then is the map exported
-    if (auto far = farPointsWarning(*newest(true)->points, voxel_size_m)) {
+  if (ended && coarseStepAt(reach_m, findings.voxel_size_m)) {  // only then is the map exported
+    if (auto far = farPointsWarning(*newest(true)->points, findings.voxel_size_m)) {
       warnings.push_back(std::move(*far));
     }
   }
@@ -187,6 +186,10 @@ FusionMapperOptions MapperCore::usedOptions() const {
 }
 
 GlobalCloudOptions MapperCore::cloudOptions() const {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return used_cloud_;
+  }
   const std::lock_guard<TurnMutex> lock(session_mutex_);
   return session_.cloudOptions();
 }
@@ -498,6 +501,7 @@ void MapperCore::publishMap(bool at_once, std::exception_ptr& error) {
 void MapperCore::publishState(std::exception_ptr& error) {
   SessionStatus status;
   FusionMapperOptions used;
+  GlobalCloudOptions used_cloud;
   bool is_new_choice = false;
   bool is_first_blur = false;
   {
@@ -509,6 +513,7 @@ void MapperCore::publishState(std::exception_ptr& error) {
     if (!queue_ && !is_new_choice && !is_first_blur) return;
     status = session_.status();
     used = session_.usedOptions();
+    used_cloud = session_.cloudOptions();
   }
   if (is_first_blur) {
     callBack(error, "the callback of the log", [&] {
@@ -541,6 +546,7 @@ void MapperCore::publishState(std::exception_ptr& error) {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_ = std::move(status);
     used_options_ = std::move(used);
+    used_cloud_ = used_cloud;
   }
   if (!failure.empty()) warn(failure, error);
 }

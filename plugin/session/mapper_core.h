@@ -178,6 +178,7 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   SessionStatus status_;
   PixelSizes pixel_sizes_;            // under mutex_
   FusionMapperOptions used_options_;  // in live operation: with the chosen options
+  GlobalCloudOptions used_cloud_;     // as used_options_
   LiveStatus live_;
   std::shared_ptr<const MapSnapshot> map_;
   cv::Mat1f newest_depth_;

@@ -538,9 +538,8 @@ class HostRecording : public Recording {
   double progress() const override { return of_->progress(); }
   RecordingCounts counts() const override {
     RecordingCounts counts = of_->counts();
-    for (std::vector<Warning>* of : {&counts.warnings, &counts.notes}) {
-      for (Warning& warning : *of) warning.text = hostText(warning.text, HostFace::kRecording);
-    }
+    counts.warnings = hostTexts(std::move(counts.warnings), HostFace::kRecording);
+    counts.notes = hostTexts(std::move(counts.notes), HostFace::kRecording);
     return counts;
   }
 
