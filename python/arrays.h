@@ -108,7 +108,7 @@ struct PointRecord {
   double x, y, z;
   float intensity;
   std::uint32_t support;
-  float sigma;
+  float sigma, probability;
 };
 
 inline py::array pointsOf(const MapCloud& cloud) {
@@ -116,7 +116,7 @@ inline py::array pointsOf(const MapCloud& cloud) {
   PointRecord* next = records.mutable_data();
   for (const MapPoint& point : cloud.points) {
     const Eigen::Vector3d p_world = positionIn(cloud, point);
-    *next++ = {p_world.x(), p_world.y(), p_world.z(), point.intensity, point.support, point.sigma};
+    *next++ = {p_world.x(), p_world.y(), p_world.z(), point.intensity, point.support, point.sigma, point.probability};
   }
   records.attr("flags").attr("writeable") = false;
   return records;

@@ -315,6 +315,8 @@ confidence : numpy.ndarray, float32, shape (rows, columns)
     Fused ray density at the depth, or the largest of the pixel.
 sigma : numpy.ndarray, float32, shape (rows, columns)
     Standard deviation of the depth, metres; 0: no depth.
+probability : numpy.ndarray, float32, shape (rows, columns)
+    Probability that the depth is within 10 % of the truth; 0: no depth, NaN: not known (``depth.extraction``: paper).
 pose : numpy.ndarray, float64, shape (4, 4)
     T_world_ref: maps coordinates of the view (x right, y down, z forward) to the world.
 K : numpy.ndarray, float64, shape (3, 3)
@@ -327,6 +329,8 @@ K : numpy.ndarray, float64, shape (3, 3)
       .def_property_readonly("confidence",
                              [](const Keyframe& k) { return imageOf(k.map.confidence); })
       .def_property_readonly("sigma", [](const Keyframe& k) { return imageOf(sigmaOf(k.map)); })
+      .def_property_readonly("probability",
+                             [](const Keyframe& k) { return imageOf(k.map.probability); })
       .def("points", &worldPoints,
            "The points (n, 3) of the depths in the world, metres, row by row.")
       .def_property_readonly("pose",
@@ -341,7 +345,7 @@ K : numpy.ndarray, float64, shape (3, 3)
                                   std::array{p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()},
                                   std::array{k.view.fx, k.view.fy, k.view.cx, k.view.cy},
                                   imageOf(k.map.depth), imageOf(k.map.confidence),
-                                  imageOf(k.map.variance));
+                                  imageOf(k.map.variance), imageOf(k.map.probability));
           },
           [](const py::tuple& state) {
             auto keyframe = std::make_shared<Keyframe>();
@@ -354,6 +358,12 @@ K : numpy.ndarray, float64, shape (3, 3)
             keyframe->map.depth = imageFrom(state[5]);
             keyframe->map.confidence = imageFrom(state[6]);
             keyframe->map.variance = imageFrom(state[7]);
+            if (state.size() > 8) {
+              keyframe->map.probability = imageFrom(state[8]);
+            } else {  // pickled by an earlier version
+              keyframe->map.probability = keyframe->map.depth.clone();
+              keyframe->map.probability.setTo(NAN, keyframe->map.depth > 0);
+            }
             const cv::Size size = keyframe->map.depth.size();
             keyframe->view = {size.width, size.height, view[0], view[1], view[2], view[3]};
             return keyframe;
@@ -461,7 +471,7 @@ void defineMapper(py::module_& module) {
 
 PYBIND11_MODULE(_engine, module) {
   PYBIND11_NUMPY_DTYPE(EventRecord, x, y, p, t);
-  PYBIND11_NUMPY_DTYPE(PointRecord, x, y, z, intensity, support, sigma);
+  PYBIND11_NUMPY_DTYPE(PointRecord, x, y, z, intensity, support, sigma, probability);
   module.attr("VERSION") = EFM_VERSION;
   hostIsPython() = true;
   module.def("python_text",

@@ -86,30 +86,47 @@ struct WindowDsi {
   }
 };
 
+/// A window [t0, t1) to map.
+struct WindowTimes {
+  std::int64_t t0_ns, t1_ns;
+  std::optional<std::int64_t> t_ref_ns;
+};
+
+/// Maps one window. @param prepare changes the job before it runs.
+template <typename Prepare>
+std::pair<std::shared_ptr<const Keyframe>, MapResult> mapWindow(const RecordingSource& source,
+                                                                const Options& options,
+                                                                const WindowTimes& times,
+                                                                const OnProgress& on_progress,
+                                                                const Prepare& prepare) {
+  const Released released;
+  std::shared_ptr<const Keyframe> made;
+  MapJob job = jobOf(source, options, nullptr, on_progress);
+  FusionMapperOptions& mapper = job.options.mapper;
+  mapper.only_window = windowOf(times.t0_ns, times.t1_ns, mapper.policy.reference);
+  if (times.t_ref_ns) mapper.only_window->t_ref_ns = *times.t_ref_ns;
+  job.options.mapper.validate();
+  job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
+    made = std::make_shared<const Keyframe>(keyframe);
+  };
+  prepare(job);
+  MapResult result = mapWindowInto(std::move(job));
+  result.rejectError();
+  return {std::move(made), std::move(result)};
+}
+
 py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int64_t t0_ns,
                  std::int64_t t1_ns, std::optional<std::int64_t> t_ref_ns,
                  const OnProgress& on_progress) {
   auto dsi = std::make_shared<WindowDsi>();
-  std::shared_ptr<const Keyframe> made;
-  MapResult result;
-  {
-    const Released released;
-    MapJob job = jobOf(source, options, nullptr, on_progress);
-    FusionMapperOptions& mapper = job.options.mapper;
-    mapper.only_window = windowOf(t0_ns, t1_ns, mapper.policy.reference);
-    if (t_ref_ns) mapper.only_window->t_ref_ns = *t_ref_ns;
-    job.options.mapper.validate();
-    job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
-      made = std::make_shared<const Keyframe>(keyframe);
-    };
-    const auto caller = std::this_thread::get_id();
-    job.on_dsi_plane = [&](int plane, int planes, const cv::Mat1f& values) {
-      dsi->addPlane(plane, planes, values);
-      if (std::this_thread::get_id() == caller) checkSignals();
-    };
-    result = mapWindowInto(std::move(job));
-    result.rejectError();
-  }
+  const auto caller = std::this_thread::get_id();
+  const auto [made, result] =
+      mapWindow(source, options, {t0_ns, t1_ns, t_ref_ns}, on_progress, [&](MapJob& job) {
+        job.on_dsi_plane = [&](int plane, int planes, const cv::Mat1f& values) {
+          dsi->addPlane(plane, planes, values);
+          if (std::this_thread::get_id() == caller) checkSignals();
+        };
+      });
   const DepthPlanes planes(result.report.options.mapper.keyframe.planes);
   py::array_t<double> depths(planes.size());
   for (int plane = 0; plane < planes.size(); ++plane)
@@ -126,6 +143,29 @@ py::tuple mapDsi(const RecordingSource& source, const Options& options, std::int
   }
   const int window = result.report.options.mapper.keyframe.extraction.threshold_kernel;
   return py::make_tuple(values, depths, made, imageOf(localContrast(largest, window)));
+}
+
+template <typename Inputs>
+py::array evidenceOf(const std::vector<PixelEvidence<Inputs>>& evidence) {
+  py::array_t<PixelEvidence<Inputs>> records(static_cast<py::ssize_t>(evidence.size()));
+  std::copy(evidence.begin(), evidence.end(), records.mutable_data());
+  return records;
+}
+
+py::tuple mapCandidates(const RecordingSource& source, const Options& options, std::int64_t t0_ns,
+                        std::int64_t t1_ns, std::optional<std::int64_t> t_ref_ns,
+                        const OnProgress& on_progress) {
+  const auto [made, result] =
+      mapWindow(source, options, {t0_ns, t1_ns, t_ref_ns}, on_progress, [](MapJob& job) {
+        DepthExtractionOptions& extraction = job.options.mapper.keyframe.extraction;
+        if (extraction.extraction != ExtractionMethod::kAggregated) {
+          throw std::invalid_argument("depth.extraction: must be aggregated, for candidates");
+        }
+        extraction.keep_evidence = extraction.neighbours = true;
+      });
+  const DepthEvidence none;
+  const DepthEvidence& evidence = made->map.evidence ? *made->map.evidence : none;
+  return py::make_tuple(evidenceOf(evidence.candidates), evidenceOf(evidence.neighbours), made);
 }
 
 std::string infoOf(const RecordingSource& source) {
@@ -218,6 +258,11 @@ void defineJobs(py::module_& module) {
       .def("reject_error", &MapResult::rejectError);
   module.def("run_map", &mapRecordingInto, releases);
   module.def("run_dsi", &mapDsi);
+  PYBIND11_NUMPY_DTYPE_EX(PixelEvidence<CandidateInputs>, x, "x", y, "y", depth_m, "depth", sigma_m,
+                          "sigma", probability, "probability", inputs, "inputs");
+  PYBIND11_NUMPY_DTYPE_EX(PixelEvidence<NeighbourInputs>, x, "x", y, "y", depth_m, "depth", sigma_m,
+                          "sigma", probability, "probability", inputs, "inputs");
+  module.def("run_candidates", &mapCandidates);
   module.def("read_info", &infoOf, releases);
   module.def("simulate", &simulateInto, releases);
   module.def("simulation_presets", &simulationPresets);

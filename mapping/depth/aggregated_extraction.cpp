@@ -9,7 +9,10 @@
 #include <cassert>
 #include <cmath>
 
+#include "mapping/depth/depth_probability.h"
+#include "mapping/depth/neighbour_depths.h"
 #include "mapping/depth/peak_fit.h"
+#include "mapping/depth/surroundings.h"
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/kernels/kernels.h"
 
@@ -108,49 +111,6 @@ namespace {
 /// Sigma of the Gaussian weight of other pixels, by their distance.
 constexpr float kDistanceSigma_px = 2;
 
-/// The positions and weights of the pixels around one pixel.
-class Surroundings {
- public:
-  void clear() {
-    size_ = 0;
-    total_ = 0;
-  }
-  void add(float position, float weight) {
-    positions_[size_] = position;
-    weights_[size_++] = weight;
-    total_ += weight;
-  }
-
-  /// Returns the smallest position with at least half of the weight at or below it.
-  float weightedMedian() { return smallestWith(0.5F * total_); }
-
-  /// Returns the median distance from a position (the larger of two middle distances). Afterwards,
-  /// the positions are distances with equal weights.
-  float medianDistance(float from) {
-    for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
-    std::fill_n(weights_.begin(), size_, 1.0F);
-    return smallestWith(static_cast<float>(size_ / 2 + 1));
-  }
-
- private:
-  /// Returns the smallest position with at least this weight at or below it.
-  float smallestWith(float min_weight) {
-    std::fill_n(below_.begin(), size_, 0.0F);
-    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
-    float smallest = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < size_; ++i) {
-      if (below_[i] >= min_weight) smallest = std::min(smallest, positions_[i]);
-    }
-    return smallest;
-  }
-
-  using Values = std::array<float, PixelNeighbours::kMaxPixels + kernels::kRankPadding>;
-  const kernels::RankFunctions& ranks_ = kernels::rankFunctions(fastestKernel());
-  Values positions_{}, weights_{}, below_{};
-  std::size_t size_ = 0;
-  float total_ = 0;  // sum of the weights
-};
-
 }  // namespace
 
 std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
@@ -172,7 +132,9 @@ std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
           const float weight =
               weights[j] * by_distance[static_cast<std::size_t>(offset.dot(offset))];
           others += weight;
-          agreeing += std::abs(positions[j] - positions[i]) < near ? weight : 0.0F;
+          if (!(std::abs(positions[j] - positions[i]) < near)) return;
+          agreeing += weight;
+          agreement[i].agreeing += j == i ? 0 : 1;
         });
         agreement[i].median = around.weightedMedian();
         agreement[i].spread = around.medianDistance(agreement[i].median);
@@ -195,8 +157,6 @@ namespace {
 
 // A step: see `planesPerStep`.
 constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
-constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
-constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
 constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
 
 cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
@@ -230,6 +190,59 @@ double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
   return kMinSigma * kMinSigma + kWidthTimesSpread * peak.width_sq * (around.spread + kMinSpread);
 }
 
+CandidateInputs inputsOf(float contrast, float second_peak, const AggregatedPeak& peak,
+                         const LocalAgreement& around, const DepthPlanes& planes,
+                         double step_planes) {
+  const auto step = static_cast<float>(step_planes);
+  return {std::log(contrast),
+          std::log(1.01F - std::min(second_peak, 0.999F)),
+          std::log(around.agreeing_fraction + 0.05F),
+          std::log(1.0F + static_cast<float>(around.agreeing)),
+          std::log(around.spread / step + 0.1F),
+          std::log(std::min(std::sqrt(peak.width_sq) / step, 50.0F) + 0.1F),
+          std::log(stepsOfTenPercent(around.median, planes, step_planes))};
+}
+
+/// Returns the pixels that may get a depth from the candidates around them: those that touch a
+/// candidate, and candidates without a depth of their own.
+cv::Mat1b neighbourMask(const SparseMask& candidates, const std::vector<PlanePosition>& depths,
+                        const cv::Mat1f& confidence) {
+  cv::Mat1b touching = cv::Mat1b::zeros(confidence.size());
+  candidates.forEach([&](std::size_t, cv::Point at) {
+    touching(cv::Rect(at.x - 1, at.y - 1, 3, 3)) = 255;  // candidates lie inside the frame
+  });
+  candidates.forEach([&](std::size_t i, cv::Point at) {
+    if (depths[i].probability > 0) touching(at) = 0;
+  });
+  cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());
+  const cv::Rect inner = insideFrame(confidence.size());
+  if (!inner.empty()) cv::Mat(touching & (confidence > 0))(inner).copyTo(mask(inner));
+  return mask;
+}
+
+/// The probability of a candidate at an end plane or with a flat column. It is not kept, but its
+/// neighbours use it.
+constexpr float kProbabilityWithoutPeak = 0.01F;
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+/// From this second peak on, as a fraction of the peak, a column is flat.
+constexpr float kFlatColumn = 0.98F;
+
+template <typename Inputs>
+std::vector<PixelEvidence<Inputs>> evidenceOf(const SparseMask& mask,
+                                              const std::vector<PlanePosition>& positions,
+                                              const std::vector<Inputs>& inputs,
+                                              const DepthPlanes& planes) {
+  std::vector<PixelEvidence<Inputs>> evidence;
+  mask.forEach([&](std::size_t i, cv::Point at) {
+    const auto& [position, variance, probability] = positions[i];
+    const double sigma = std::sqrt(variance) * planes.inverseDepthStepAt(position);
+    const double depth_m = planes.depthAt(position);
+    evidence.push_back({at.x, at.y, static_cast<float>(depth_m),
+                        static_cast<float>(depth_m * depth_m * sigma), probability, inputs[i]});
+  });
+  return evidence;
+}
+
 }  // namespace
 
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
@@ -249,40 +262,54 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     weights[i] = contrast(at);
   });
   const std::size_t second = peakEnd(peaks, step_planes);
-  const std::vector<LocalAgreement> around = localAgreement(
-      candidates, positions, weights, static_cast<float>(kAgreementSteps * step_planes));
+  const auto near = static_cast<float>(kAgreementSteps * step_planes);
+  const std::vector<LocalAgreement> around = localAgreement(candidates, positions, weights, near);
 
-  /// The local contrast, lowered for ambiguous peaks and disagreeing neighbours.
-  const auto quality_of = [&](std::size_t i) {
-    const double unambiguous =
-        std::pow(std::max(0.0, 1.0 - peaks[i].second_peak[second]), kSteepness);
-    const double off_median = std::abs(peaks[i].position - around[i].median);
-    return weights[i] * unambiguous * std::exp(-off_median / (kMedianSteps * step_planes)) *
-           around[i].agreeing_fraction;
-  };
   const bool has_inner_planes = planes.size() > 2;
   // Depths are unobservable if all planes lie within a pixel of parallax.
   const bool all_alike = has_inner_planes && range_px < 1;
-  cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());
-  std::vector<PlanePosition> found;
   PixelCounts counts;
   counts.candidates = candidates.size();
-  candidates.forEach([&](std::size_t i, cv::Point at) {
+  std::vector<CandidateInputs> inputs(candidates.size());
+  std::vector<PlanePosition> depths(candidates.size());
+  CandidateDepths seen{&candidates, std::move(positions), std::move(weights),
+                       std::vector<float>(candidates.size()),
+                       std::vector<double>(candidates.size())};
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    const float second_peak = peaks[i].second_peak[second];
+    inputs[i] = inputsOf(seen.contrasts[i], second_peak, peaks[i], around[i], planes, step_planes);
+    const bool at_end = has_inner_planes && peaks[i].at_end;
+    const bool has_peak = !at_end && second_peak < kFlatColumn;
+    const bool has_depth = has_peak && around[i].agreeing > 0;
+    const float probability = has_inner_planes ? probabilityOf(inputs[i]) : kUnknown;
+    seen.probabilities[i] = has_peak ? probability : kProbabilityWithoutPeak;
+    seen.variances[i] = varianceOf(peaks[i], around[i]);
+    depths[i] = {around[i].median, seen.variances[i], has_depth ? seen.probabilities[i] : 0};
+  });
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (has_inner_planes && peaks[i].at_end) {
       ++(2 * peaks[i].position < float(planes.size()) ? counts.at_nearest : counts.at_farthest);
-      return;
-    }
-    if (all_alike || !(quality_of(i) > options.min_quality)) {
+    } else if (all_alike || depths[i].probability <= options.min_probability) {
       ++counts.ambiguous;
-      return;
     }
-    mask(at) = 255;
-    found.push_back({around[i].median, varianceOf(peaks[i], around[i])});
-  });
-  const SparseMask sparse(mask);
-  DepthMap map = depthMapOf(sparse, found, confidence, planes);
+  }
+  DepthMap map = emptyDepthMap(confidence);
   map.pixels = counts;
-  if (options.dilate) dilate(sparse, mask, map);
+  if (all_alike) return map;
+  addDepths(candidates, depths, planes, options.min_probability, map);
+  DepthEvidence evidence;
+  if (options.keep_evidence) evidence.candidates = evidenceOf(candidates, depths, inputs, planes);
+  if (options.neighbours && has_inner_planes) {
+    const SparseMask pixels(neighbourMask(candidates, depths, confidence));
+    const NeighbourDepths beside =
+        neighbourDepths(pixels, seen, confidence, planes, step_planes, near);
+    map.pixels.neighbours =
+        addDepths(pixels, beside.positions, planes, options.min_probability, map);
+    if (options.keep_evidence) {
+      evidence.neighbours = evidenceOf(pixels, beside.positions, beside.inputs, planes);
+    }
+  }
+  if (options.keep_evidence) map.evidence = std::make_shared<DepthEvidence>(std::move(evidence));
   return map;
 }
 

@@ -48,6 +48,7 @@ struct LocalAgreement {
   /// Weighted fraction of the other pixels whose position is near the pixel's own, 0 to 1. The
   /// weight falls with the distance in the image.
   float agreeing_fraction = 0;
+  int agreeing = 0;  ///< Number of these pixels.
 };
 
 /// Compares the position of each pixel of a mask with the positions around it.
@@ -68,12 +69,13 @@ cv::Mat1f localContrast(const cv::Mat1f& confidence, int window);
 /// 2. Sum the DSI columns around each (`aggregateColumns`); the peak of the sum is its first depth.
 /// 3. The depth of a pixel is the median of the first depths in 9x9 pixels, weighted by local
 ///    contrast (`localAgreement`).
-/// 4. Quality: the local contrast, lowered if the summed column is flat or has a second peak nearly
-///    as high (an edge along the motion has no depth), if the first depth differs from the median,
-///    and if few neighbours agree. Keep the pixel if its quality is above `min_quality`.
+/// 4. Probability (`CandidateInputs`) that this depth is right: from the local contrast, the width
+///    of the peak, a second peak, and the depths around it. Keep the pixel if its probability is
+///    above `min_probability`.
 /// 5. Variance from the width of the peak and the spread of the depths around the pixel.
-/// If there are more than two planes, peaks on the first and the last plane are not kept: points
-/// beyond the planes have their peaks there.
+/// Flat columns are not kept, nor pixels without a neighbour that agrees. If there are more than
+/// two planes, peaks on the first and the last plane are not kept: points beyond the planes have
+/// their peaks there. With one or two planes, probabilities are not known.
 /// @param dsi has columns, selected in a window of `threshold_kernel` pixels.
 /// @param parallax_px_m see `KeyframeFacts`.
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,

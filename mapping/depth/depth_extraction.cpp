@@ -25,6 +25,10 @@ ExtractionMethod extractionMethodFromName(std::string_view name) { return valueI
 
 void DepthExtractionOptions::validate() const {
   requireFields(*this);
+  if (dilate && extraction != ExtractionMethod::kPaper) {
+    throw OptionError("dilate", "true", "false with extraction = aggregated: see neighbours",
+                      {"extraction"});
+  }
   const double white = max_confidence.fixed;
   requireOption(max_confidence.level != WhiteLevel::kFixed || (std::isfinite(white) && white > 0),
                 "max_confidence", white, "finite and above 0");
@@ -77,7 +81,8 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
   sparse.forEach([&](std::size_t i, cv::Point at) {
     found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
   });
-  DepthMap map = depthMapOf(sparse, found, peaks.confidence, planes);
+  DepthMap map = emptyDepthMap(peaks.confidence);
+  addDepths(sparse, found, planes, 0, map);
   map.pixels.candidates = sparse.size();
   if (options.dilate) dilate(sparse, mask, map);
   return map;

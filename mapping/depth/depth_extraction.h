@@ -40,21 +40,24 @@ struct MaxConfidence {
 struct DepthExtractionOptions {
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
   int threshold_kernel = 5;  ///< Side of the Gaussian window in pixels; odd, 3 to 255.
-  bool dilate = false;       ///< True: the mask grows to its four neighbours (the paper's MF).
 
-  // Options of `kAggregated`. Both are fractions of the keyframe's mean confidence, so that one
-  // value suits all recordings.
-  /// Minimum local contrast of a pixel to be considered. Above 0.
+  // Options of `kAggregated`.
+  /// Minimum local contrast of a pixel to be considered, as a fraction of the keyframe's mean
+  /// confidence. Above 0.
   double min_local_contrast = 0.15;
-  /// Minimum quality of a pixel to be kept: local contrast, lowered if the peak is ambiguous or
-  /// neighbours disagree. 0 or above; larger values keep fewer and more certain points. The default
-  /// has the best F1 over simulated scenes and a real one (docs/studies.md, section 12).
-  double min_quality = 0.05;
+  /// A depth is kept if its probability is above this (`DepthMap::probability`). 0 to below 1;
+  /// larger values keep fewer and more certain points.
+  double min_probability = 0.9;
+  /// True: also depths for pixels near the candidates (`neighbourDepths`), each with its own
+  /// probability.
+  bool neighbours = false;
+  bool keep_evidence = false;  ///< True: `DepthMap::evidence`. No option of files.
 
   // Options of `kPaper`.
   /// C: minimum difference of a pixel from its surroundings, in grey values (of 255). -255 to 255.
   double threshold_c = 5;
   MaxConfidence max_confidence;
+  bool dilate = false;   ///< True: the mask grows to its four neighbours (the paper's MF).
   int median_size = 5;   ///< Side of the median window in pixels; odd, 1 (no filter) to 255.
   bool subplane = true;  ///< True: a parabola is fitted through the peak and its neighbours.
 
@@ -64,8 +67,8 @@ struct DepthExtractionOptions {
     visit("threshold_kernel", self.threshold_kernel, Allowed::from(3, 255, "odd, 3 to 255").odd());
     visit("min_local_contrast", self.min_local_contrast,
           Allowed::above(0, Allowed::kFinite, "finite and above 0"));
-    visit("min_quality", self.min_quality,
-          Allowed::from(0, Allowed::kFinite, "finite, 0 or above"));
+    visit("min_probability", self.min_probability, Allowed::from(0, 1, "0 to below 1").below());
+    visit("neighbours", self.neighbours);
     visit("threshold_c", self.threshold_c, Allowed::from(-255, 255, "-255 to 255"));
     visit("max_confidence", self.max_confidence);
     visit("median_size", self.median_size, Allowed::from(1, 255, "odd, 1 to 255").odd());

@@ -47,6 +47,7 @@ void fillFromAdjacent(const cv::Mat1b& mask, cv::Point here, DepthMap& map) {
   map.depth(here) = map.depth(*best);
   map.confidence(here) = map.confidence(*best);
   map.variance(here) = map.variance(*best);
+  map.probability(here) = map.probability(*best);
 }
 
 }  // namespace
@@ -56,6 +57,7 @@ PixelCounts& PixelCounts::operator+=(const PixelCounts& other) {
   at_nearest += other.at_nearest;
   at_farthest += other.at_farthest;
   ambiguous += other.ambiguous;
+  neighbours += other.neighbours;
   return *this;
 }
 
@@ -64,21 +66,26 @@ cv::Rect insideFrame(cv::Size size) {
           std::max(0, size.height - 2 * kFrame)};
 }
 
-DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& positions,
-                    const cv::Mat1f& confidence, const DepthPlanes& planes) {
+DepthMap emptyDepthMap(const cv::Mat1f& confidence) {
   const cv::Size size = confidence.size();
-  const cv::Rect inner = insideFrame(size);
-  DepthMap result{cv::Mat1f::zeros(size), confidence, cv::Mat1f::zeros(size), {}};
+  return {cv::Mat1f::zeros(size), confidence, cv::Mat1f::zeros(size), cv::Mat1f::zeros(size)};
+}
+
+std::size_t addDepths(const SparseMask& mask, const std::vector<PlanePosition>& positions,
+                      const DepthPlanes& planes, double min_probability, DepthMap& map) {
+  const cv::Rect inner = insideFrame(map.depth.size());
+  std::size_t added = 0;
   mask.forEach([&](std::size_t i, cv::Point at) {
-    if (!inner.contains(at)) return;
-    const auto [position, variance] = positions[i];
+    const auto [position, variance, probability] = positions[i];
+    if (!inner.contains(at) || probability <= min_probability) return;
     const double step = planes.inverseDepthStepAt(position);
-    result.depth(at) = static_cast<float>(planes.depthAt(position));
+    map.depth(at) = static_cast<float>(planes.depthAt(position));
     // The step of a single plane is 0, and 0 times infinite is not a number.
-    result.variance(at) =
-        static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
+    map.variance(at) = static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
+    map.probability(at) = probability;
+    ++added;
   });
-  return result;
+  return added;
 }
 
 // This works in place: filled pixels are not in the mask, so they are never copied.

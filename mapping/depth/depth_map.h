@@ -8,8 +8,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <vector>
 
+#include "mapping/depth/depth_probability.h"
 #include "mapping/geometry/reference_view.h"
 
 namespace efm {
@@ -94,9 +97,26 @@ struct PixelCounts {
   std::uint64_t candidates = 0;
   std::uint64_t at_nearest = 0;   ///< The peak lies on the first plane: no depth.
   std::uint64_t at_farthest = 0;  ///< The peak lies on the last plane: no depth.
-  std::uint64_t ambiguous = 0;    ///< The quality is too low (`min_quality`): no depth.
+  /// The probability is too low (`min_probability`), or the parallax is: no depth.
+  std::uint64_t ambiguous = 0;
+  std::uint64_t neighbours = 0;  ///< Pixels with a depth from the candidates around them.
 
   PixelCounts& operator+=(const PixelCounts& other);
+};
+
+/// What decides on the depth of a pixel, kept or not.
+template <typename Inputs>
+struct PixelEvidence {
+  int x = 0;
+  int y = 0;
+  float depth_m = 0;
+  float sigma_m = 0;
+  float probability = 0;  ///< 0: never kept.
+  Inputs inputs{};        ///< Of the network that gives the probability.
+};
+struct DepthEvidence {
+  std::vector<PixelEvidence<CandidateInputs>> candidates;
+  std::vector<PixelEvidence<NeighbourInputs>> neighbours;
 };
 
 /// A semi-dense depth map in the reference view.
@@ -106,27 +126,36 @@ struct DepthMap {
   /// Variance of inverse depth, 1/m^2: 0 without a depth, infinite if the peak is flat or lies on
   /// the first or the last plane.
   cv::Mat1f variance;
+  /// Probability that the depth is within 10 % of the truth: 0 without a depth, NaN if it is not
+  /// known (`ExtractionMethod::kPaper`). Empty: not known for any pixel.
+  cv::Mat1f probability = {};
   PixelCounts pixels = {};  ///< `ExtractionMethod::kPaper` keeps every candidate.
+  /// Null unless `DepthExtractionOptions::keep_evidence` asks for it.
+  std::shared_ptr<const DepthEvidence> evidence = {};
 };
 
-/// A position between planes, in planes, and its variance, in planes^2.
+/// A position between planes, in planes, its variance, in planes^2, and its probability.
 struct PlanePosition {
   double position = 0;
   double variance = 0;
+  float probability = std::numeric_limits<float>::quiet_NaN();
 };
 
 /// Returns the image without its frame of two pixels, which has no depths. May be empty.
 cv::Rect insideFrame(cv::Size size);
 
-/// Returns the depth map of a mask's pixels inside the frame.
-/// @param positions one per pixel of the mask.
-/// @param confidence of all pixels of the view; shared, not copied.
-DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& positions,
-                    const cv::Mat1f& confidence, const DepthPlanes& planes);
+/// Returns a map without depths. @param confidence of all pixels of the view; shared, not copied.
+DepthMap emptyDepthMap(const cv::Mat1f& confidence);
+
+/// Adds depths of a mask's pixels inside the frame: those that are more probable than
+/// `min_probability`, or whose probability is not known.
+/// @param positions one per pixel of the mask. @return the number of added depths.
+std::size_t addDepths(const SparseMask& mask, const std::vector<PlanePosition>& positions,
+                      const DepthPlanes& planes, double min_probability, DepthMap& map);
 
 /// Grows the depths by a pixel, except into the frame: an empty pixel adjacent to pixels of the
-/// mask gets depth, confidence and variance of the most confident of these pixels (of the nearer
-/// pixel if two are equal). This is the paper's morphological filter (MF).
+/// mask gets depth, confidence, variance and probability of the most confident of these pixels (of
+/// the nearer pixel if two are equal). This is the paper's morphological filter (MF).
 /// @param sparse the pixels of `mask`.
 void dilate(const SparseMask& sparse, const cv::Mat1b& mask, DepthMap& map);
 

@@ -18,6 +18,7 @@ constexpr NamedChoice<FusionRule> kRules[] = {
     {FusionRule::kArithmetic, "arithmetic"},
     {FusionRule::kRms, "rms"},
     {FusionRule::kMax, "max"},
+    {FusionRule::kPairs, "pairs"},
 };
 
 }  // namespace
@@ -33,7 +34,9 @@ bool isAndLike(FusionRule rule) {
 const std::vector<FusionRule>& allFusionRules() {
   static const std::vector<FusionRule> rules = [] {
     std::vector<FusionRule> all;
-    for (const auto& choice : kRules) all.push_back(choice.value);
+    for (const auto& choice : kRules) {
+      if (choice.value != FusionRule::kPairs) all.push_back(choice.value);
+    }
     return all;
   }();
   return rules;
@@ -45,6 +48,7 @@ const kernels::FusionSteps& stepsOf(FusionRule rule) {
     case FusionRule::kMin:
       return functions.min;
     case FusionRule::kHarmonic:
+    case FusionRule::kPairs:
       return functions.harmonic;
     case FusionRule::kGeometric:
       return functions.geometric;
@@ -58,8 +62,13 @@ const kernels::FusionSteps& stepsOf(FusionRule rule) {
   throw std::logic_error("a fusion rule has no arithmetic");
 }
 
-FusionAccumulator::FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels)
-    : steps_(&stepsOf(rule)), inputs_(inputs), mean_(voxels) {
+FusionAccumulator::FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels,
+                                     bool all_pairs)
+    : steps_(&stepsOf(rule)),
+      inputs_(inputs),
+      pairs_(rule == FusionRule::kPairs && inputs > 2),
+      all_pairs_(all_pairs),
+      mean_(voxels) {
   assert(inputs >= 1);
 }
 
@@ -83,9 +92,31 @@ void FusionAccumulator::add(const PlaneValues& values) {
     }
     return;
   }
+  if (pairs_) return addPairs(values, first);
   if (first) std::fill(mean_.begin(), mean_.end(), steps_->start);
   steps_->fold(mean_.data(), values.data(), mean_.size());
   if (isComplete()) steps_->finish(mean_.data(), static_cast<float>(inputs_), mean_.size());
+}
+
+namespace {
+
+void addTo(PlaneValues& sum, const PlaneValues& values) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += values[i];
+}
+
+}  // namespace
+
+void FusionAccumulator::addPairs(const PlaneValues& values, bool first) {
+  if (first) {
+    kept_.clear();
+    std::fill(mean_.begin(), mean_.end(), 0.0F);
+  }
+  for (const PlaneValues& other : kept_) {
+    pair_ = other;
+    steps_->pair(pair_.data(), values.data(), pair_.size());
+    addTo(mean_, pair_);
+  }
+  if (first || all_pairs_) kept_.push_back(values);
 }
 
 namespace {
@@ -113,11 +144,12 @@ std::vector<CameraSlot> inputsInOrder(const FusionInputs& inputs, bool cameras_f
   return all;
 }
 
-void addTo(PlaneValues& sum, const PlaneValues& values) {
-  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += values[i];
-}
-
 }  // namespace
+
+void FusionOptions::validate() const {
+  requireOption(across_time != FusionRule::kPairs, "across_time", nameOf(across_time),
+                "a mean: pairs are of cameras");
+}
 
 std::string_view nameOf(FusionOrder order) { return nameIn(kOrders, order); }
 FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders, name); }
@@ -128,9 +160,10 @@ PlaneFusion::PlaneFusion(const FusionOptions& options, const FusionInputs& input
       outer_count_(camerasFirst(options) ? inputs.slots_per_group : inputs.cameras),
       inputs_(inputsInOrder(inputs, camerasFirst(options))),
       inner_(camerasFirst(options) ? options.across_cameras : options.across_time,
-             camerasFirst(options) ? inputs.cameras : inputs.slots_per_group, voxels),
+             camerasFirst(options) ? inputs.cameras : inputs.slots_per_group, voxels,
+             options.all_pairs),
       outer_(camerasFirst(options) ? options.across_time : options.across_cameras, outer_count_,
-             outer_count_ > 1 ? voxels : 0),
+             outer_count_ > 1 ? voxels : 0, options.all_pairs),
       sum_(groups_ > 1 ? voxels : 0) {
   assert(inputs.cameras >= 1 && inputs.slots_per_group >= 1 && inputs.groups >= 1);
   if (keep == Keep::kFusedOnly) return;

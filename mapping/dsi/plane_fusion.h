@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/option.h"
 #include "mapping/dsi/dsi_grid.h"
 
 namespace efm {
@@ -16,16 +17,20 @@ struct FusionSteps;
 /// The mean that fuses the ray densities of several DSIs, voxel by voxel (Ghosh and Gallego 2022,
 /// Eqs. 6-11). All means are symmetric, give n inputs equal weights, and are ordered:
 /// min <= harmonic <= geometric <= arithmetic <= rms <= max.
-enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
+///
+/// `kPairs` is no mean, and is for cameras alone: the sum of the harmonic means of the first input
+/// with each other input. A wrong depth still needs the votes of two cameras, but not all cameras
+/// need to see an edge. Of two inputs it is the harmonic mean.
+enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax, kPairs };
 
-/// Returns "min", "harmonic", "geometric", "arithmetic", "rms" or "max".
+/// Returns "min", "harmonic", "geometric", "arithmetic", "rms", "max" or "pairs".
 std::string_view nameOf(FusionRule rule);
 FusionRule fusionRuleFromName(std::string_view name);
 /// Returns whether the mean is zero if any input is zero.
 bool isAndLike(FusionRule rule);
-/// Returns all rules, in the order of the enum.
+/// Returns all means, in the order of the enum.
 const std::vector<FusionRule>& allFusionRules();
-/// Returns the rule's arithmetic.
+/// Returns the rule's arithmetic; for `kPairs` that of one pair.
 const kernels::FusionSteps& stepsOf(FusionRule rule);
 
 /// The mean of planes by one rule. Inputs are added one by one, so that one plane of memory is
@@ -34,7 +39,8 @@ const kernels::FusionSteps& stepsOf(FusionRule rule);
 class FusionAccumulator {
  public:
   /// @param inputs the number of inputs of each mean, at least 1.
-  FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels);
+  /// @param all_pairs see FusionOptions.
+  FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels, bool all_pairs = false);
 
   /// Returns a plane for the next input. A first input that is written to it needs no copy.
   PlaneValues& next();
@@ -48,9 +54,14 @@ class FusionAccumulator {
 
  private:
   bool isFirst() const { return added_ == 0 || isComplete(); }
+  void addPairs(const PlaneValues& values, bool first);
 
   const kernels::FusionSteps* steps_;
   int inputs_;
+  bool pairs_;
+  bool all_pairs_;
+  std::vector<PlaneValues> kept_;  // for pairs: the inputs that make pairs with later inputs
+  PlaneValues pair_;
   int added_ = 0;
   PlaneValues mean_;
   PlaneValues next_;
@@ -66,11 +77,14 @@ FusionOrder fusionOrderFromName(std::string_view name);
 /// The fusion of the DSIs of several cameras and sub-intervals (Ghosh and Gallego 2022, Sec. 3.4
 /// and 3.5): any rule on either axis, in either order. Algorithm 1 is harmonic across cameras with
 /// one sub-interval; arithmetic across time, then harmonic across cameras, gives the same result.
-/// Algorithm 2, the default, is harmonic across cameras, then arithmetic across time.
+/// Algorithm 2 is harmonic across cameras, then arithmetic across time. The default differs from it
+/// with three and more cameras: their pairs are summed.
 struct FusionOptions {
-  FusionRule across_cameras = FusionRule::kHarmonic;
+  FusionRule across_cameras = FusionRule::kPairs;
   FusionRule across_time = FusionRule::kArithmetic;
   FusionOrder order = FusionOrder::kCamerasThenTime;
+  bool all_pairs =
+      false;  ///< `kPairs`: of all inputs, not of the first one alone. No file's option.
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
@@ -78,6 +92,7 @@ struct FusionOptions {
     visit("across_time", self.across_time);
     visit("order", self.order);
   }
+  void validate() const;
 };
 
 /// The numbers of inputs of a plane.

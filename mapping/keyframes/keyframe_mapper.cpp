@@ -305,9 +305,33 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   return keyframe;
 }
 
+/// Returns the fusion of the cameras under `FusionRule::kPairs`. Moves the camera to the front that
+/// makes pairs with the others: the reference camera, or if it is not selected, the first selected
+/// one. If this camera is silent, all others make pairs with each other. The time slices of a
+/// single camera have the harmonic mean of them all.
+FusionOptions KeyframeMapper::pairsOf(std::vector<WindowRays>& cameras) const {
+  FusionOptions fusion = options_.sweep.fusion;
+  if (fusion.across_cameras != FusionRule::kPairs) return fusion;
+  if (cameras.size() < 3) {
+    fusion.across_cameras = FusionRule::kHarmonic;
+    return fusion;
+  }
+  const bool selected =
+      std::count(selected_.begin(), selected_.end(), options_.reference_camera) > 0;
+  const int zero = selected ? options_.reference_camera : selected_.front();
+  const auto first = std::find_if(cameras.begin(), cameras.end(), [zero](const WindowRays& camera) {
+    return camera.camera == zero && camera.events > 0;
+  });
+  fusion.all_pairs = first == cameras.end();
+  if (!fusion.all_pairs) std::rotate(cameras.begin(), first, first + 1);
+  return fusion;
+}
+
 /// 4. Votes, and fuses the DSIs across cameras and time, plane by plane. Consumes the rays.
 SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
                                  DsiSink* sink) const {
+  SpaceSweepOptions sweep = options_.sweep;
+  sweep.fusion = pairsOf(cameras);
   const FusionLayout layout = groups_.layoutOf(static_cast<int>(cameras.size()));
   std::vector<CameraRays> rays;
   for (const auto& slots : layout.inputs) {
@@ -322,7 +346,7 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPl
   if (extraction.extraction == ExtractionMethod::kAggregated) {
     request.column_window = extraction.threshold_kernel;
   }
-  return sweepSpace(std::move(rays), {view_, planes}, options_.sweep, request);
+  return sweepSpace(std::move(rays), {view_, planes}, sweep, request);
 }
 
 /// 5. Finds depth and confidence in the fused DSI.

@@ -158,6 +158,7 @@ class KeyframeMapper {
                             StageHook* stages) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
                    DsiSink* sink) const;
+  FusionOptions pairsOf(std::vector<WindowRays>& cameras) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                const DepthPlanes& planes, KeyframeDepthMap& keyframe) const;
 

@@ -139,8 +139,9 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
 
 namespace {
 
-/// More certain points than a map needs: a wrong depth would widen the range.
-constexpr double kCoarseQuality = 0.1;
+/// Fewer certain points than a map needs: where poses have errors, far depths are less probable, and
+/// the range must reach them.
+constexpr double kCoarseProbability = 0.5;
 /// At the nearest plane, the distance of the cameras moves the view by this fraction of its width.
 /// Nearer objects are hardly seen twice.
 constexpr double kNearestMove = 0.5;
@@ -158,7 +159,8 @@ FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
   coarse.max_events_per_camera = coarseness.events;
   coarse.extraction = {};
   coarse.extraction.extraction = coarseness.extraction;
-  coarse.extraction.min_quality = kCoarseQuality;
+  coarse.extraction.neighbours = false;
+  coarse.extraction.min_probability = kCoarseProbability;
   coarse.motion = {};
   coarse.camera_maps = false;
   coarse.event_images = false;

@@ -36,6 +36,7 @@ std::string namesOfAvailableKernels() {
 
 void SpaceSweepOptions::validate() const {
   requireFields(*this);
+  fusion.validate();
   requireOption(isAvailable(kernelOrFastest()), "kernel", nameOf(kernelOrFastest()),
                 "one that this build and processor have: " + namesOfAvailableKernels());
 }

@@ -145,11 +145,15 @@ TileFusion::TileFusion(const FusionOptions& options, const FusionInputs& inputs,
       inputs_(inputs),
       keep_(keep),
       pairs_(keep == PlaneFusion::Keep::kFusedOnly && inputs.cameras == 2 &&
-             isAndLike(options.across_cameras) &&
+             (isAndLike(options.across_cameras) || options.across_cameras == FusionRule::kPairs) &&
              (inputs.slots_per_group == 1 || (options.across_time == FusionRule::kArithmetic &&
                                               options.order == FusionOrder::kCamerasThenTime))),
       accumulators_{TileAccumulator(kernel), TileAccumulator(kernel)},
-      units_(static_cast<std::size_t>(inputs.cameras)) {}
+      units_(static_cast<std::size_t>(inputs.cameras)) {
+  if (options_.across_cameras == FusionRule::kPairs && inputs.cameras <= 2) {
+    options_.across_cameras = FusionRule::kHarmonic;  // the same bits
+  }
+}
 
 void TileFusion::moveTo(const TileCells& tile) {
   for (TileAccumulator& accumulator : accumulators_) accumulator.moveTo(tile);

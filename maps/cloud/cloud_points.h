@@ -24,6 +24,8 @@ struct CloudPoint {
   std::uint64_t first_keyframe = 0;
   /// Standard deviation of depth, metres; NaN if it is not known.
   float sigma = std::numeric_limits<float>::quiet_NaN();
+  /// Probability that the depth is right (`DepthMap::probability`); NaN if it is not known.
+  float probability = std::numeric_limits<float>::quiet_NaN();
 };
 
 /// A point of a keyframe in its reference view. It is float like the depth map, so a stored
@@ -33,6 +35,7 @@ struct ViewPoint {
   float confidence = 0;                             ///< Fused ray density at the point, above 0.
   /// Standard deviation of depth, metres; NaN if it is not known.
   float sigma = std::numeric_limits<float>::quiet_NaN();
+  float probability = std::numeric_limits<float>::quiet_NaN();  ///< See CloudPoint.
 };
 
 /// Returns a text for messages, with all digits: "(1, 2.5, -3) with confidence 7".

@@ -58,6 +58,7 @@ void GlobalCloud::Sums::add(const VoxelPoint& point) {
   weight += point.weight;
   weighted_offset += point.weight * point.offset;
   weighted_sigma += point.weight * point.sigma;
+  weighted_probability += point.weight * point.probability;
 }
 
 void GlobalCloud::Sums::add(const Sums& other) {
@@ -65,6 +66,7 @@ void GlobalCloud::Sums::add(const Sums& other) {
   weight += other.weight;
   weighted_offset += other.weighted_offset;
   weighted_sigma = std::hypot(weighted_sigma, other.weighted_sigma);
+  weighted_probability += other.weighted_probability;
 }
 
 void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
@@ -297,7 +299,8 @@ GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const
            static_cast<std::int64_t>(cell.z())},
           point.p_world - cell * options_.voxel_size_m,
           static_cast<double>(point.confidence),
-          static_cast<double>(point.sigma)};
+          static_cast<double>(point.sigma),
+          static_cast<double>(point.probability)};
 }
 
 Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
@@ -310,9 +313,12 @@ Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
 
 CloudPoint GlobalCloud::pointOf(const MergedVoxel& voxel) const {
   const Sums& sums = voxel.sums;
-  return {positionOf(sums), static_cast<float>(sums.weight / static_cast<double>(sums.count)),
-          static_cast<std::uint32_t>(voxel.support()), voxel.first,
-          static_cast<float>(sums.weighted_sigma / sums.weight)};
+  return {positionOf(sums),
+          static_cast<float>(sums.weight / static_cast<double>(sums.count)),
+          static_cast<std::uint32_t>(voxel.support()),
+          voxel.first,
+          static_cast<float>(sums.weighted_sigma / sums.weight),
+          static_cast<float>(sums.weighted_probability / sums.weight)};
 }
 
 }  // namespace efm

@@ -51,7 +51,8 @@ struct GlobalCloudOptions {
 /// keyframe in a voxel come from the same edge, events and poses: their errors are taken as fully
 /// correlated, so many of them are not more exact than one. Errors of two keyframes are taken as
 /// independent. So sigma = sqrt(sum over keyframes of (sum of w_i sigma_i)^2) / sum(w_i). It is NaN
-/// if the sigma of a point is not known.
+/// if the sigma of a point is not known. The probability of a voxel is the mean of its points,
+/// weighted by their confidence; NaN if that of a point is not known.
 ///
 /// Two keyframes whose numbers differ by at most `kMaxNumberDifference` check each other's points
 /// (VisibilityGrid). Each voxel of a keyframe has two bits per other keyframe: one for support, one
@@ -124,6 +125,7 @@ class GlobalCloud {
     Eigen::Vector3d offset;  // from the corner of the voxel, metres
     double weight = 0;
     double sigma = 0;  // metres
+    double probability = 0;
   };
   /// The sums over the points in a voxel, of one keyframe or of all. Offsets are from the corner of
   /// the voxel: sums of coordinates far from the origin would lose digits.
@@ -134,6 +136,7 @@ class GlobalCloud {
     Eigen::Vector3d weighted_offset = Eigen::Vector3d::Zero();
     /// For one keyframe, the sum of weighted sigmas; for several, the root of its summed squares.
     double weighted_sigma = 0;
+    double weighted_probability = 0;
 
     void add(const VoxelPoint& point);
     void add(const Sums& other);

@@ -21,7 +21,8 @@ float sigmaOf(const DepthMap& map, int x, int y) {
 void appendPoints(const DepthMap& map, const ReferenceView& view, std::vector<ViewPoint>& points) {
   const cv::Size size(view.width, view.height);
   if (map.depth.size() != size || map.confidence.size() != size ||
-      (!map.variance.empty() && map.variance.size() != size)) {
+      (!map.variance.empty() && map.variance.size() != size) ||
+      (!map.probability.empty() && map.probability.size() != size)) {
     throw std::invalid_argument("the keyframe's images are not of its view's size");
   }
   for (int y = 0; y < view.height; ++y) {
@@ -31,6 +32,7 @@ void appendPoints(const DepthMap& map, const ReferenceView& view, std::vector<Vi
       if (!(depth_row[x] > 0) || !(confidence_row[x] > 0)) continue;
       points.push_back(
           {view.pointAt(x, y, depth_row[x]).cast<float>(), confidence_row[x], sigmaOf(map, x, y)});
+      if (!map.probability.empty()) points.back().probability = map.probability(y, x);
     }
   }
 }
@@ -56,8 +58,8 @@ std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
   std::vector<CloudPoint> in_world;
   in_world.reserve(points.size());
   for (const ViewPoint& point : points) {
-    in_world.push_back(
-        {T_world_ref * point.p_ref.cast<double>(), point.confidence, 1, 0, point.sigma});
+    in_world.push_back({T_world_ref * point.p_ref.cast<double>(), point.confidence, 1, 0,
+                        point.sigma, point.probability});
   }
   return in_world;
 }

@@ -46,6 +46,7 @@ MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolutio
     made.intensity = point.confidence;
     made.support = point.support;
     made.sigma = point.sigma;
+    made.probability = point.probability;
     made.first_keyframe = static_cast<std::uint32_t>(point.first_keyframe);
   }
   return cloud;

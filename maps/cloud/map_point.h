@@ -18,9 +18,9 @@ struct PointXYZI;
 
 namespace efm {
 
-/// A point of a map, registered as a point type of PCL: x, y, z, intensity, support and sigma are
-/// its fields in PCL's files. PCL's own templates compile for it if PCL_NO_PRECOMPILE is defined
-/// before the first header of PCL.
+/// A point of a map, registered as a point type of PCL: x, y, z, intensity, support, sigma and
+/// probability are its fields in PCL's files. PCL's own templates compile for it if
+/// PCL_NO_PRECOMPILE is defined before the first header of PCL.
 ///
 /// The members of PCL_ADD_POINT4D are written out: the header of that macro takes 2 s to compile.
 struct EIGEN_ALIGN16 MapPoint {
@@ -34,6 +34,8 @@ struct EIGEN_ALIGN16 MapPoint {
   std::uint32_t support = 1;  ///< Number of keyframes that saw it.
   /// Standard deviation of its depth, metres; NaN if it is not known. See GlobalCloud.
   float sigma = std::numeric_limits<float>::quiet_NaN();
+  /// Probability that its depth is right; NaN if it is not known. See GlobalCloud.
+  float probability = std::numeric_limits<float>::quiet_NaN();
   std::uint32_t first_keyframe = 0;  ///< Lowest number of a keyframe that saw it; no field.
 
   auto getVector3fMap() { return Eigen::Vector3f::Map(data); }
@@ -78,4 +80,4 @@ pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud);
 POINT_CLOUD_REGISTER_POINT_STRUCT(efm::MapPoint, (float, x, x)(float, y, y)(float, z, z)  //
                                   (float, intensity, intensity)                           //
                                   (std::uint32_t, support, support)                       //
-                                  (float, sigma, sigma))
+                                  (float, sigma, sigma)(float, probability, probability))

@@ -156,8 +156,9 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
 void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
   NumberText header;
   header << "# .PCD v0.7 - Point Cloud Data file format\n"
-            "VERSION 0.7\nFIELDS x y z intensity support sigma\nSIZE 4 4 4 4 4 4\n"
-            "TYPE F F F F U F\nCOUNT 1 1 1 1 1 1\nWIDTH "
+            "VERSION 0.7\nFIELDS x y z intensity support sigma probability\n"
+            "SIZE 4 4 4 4 4 4 4\n"
+            "TYPE F F F F U F F\nCOUNT 1 1 1 1 1 1 1\nWIDTH "
          << cloud.size() << "\nHEIGHT 1\nVIEWPOINT " << cloud.sensor_origin_.x() << " "
          << cloud.sensor_origin_.y() << " " << cloud.sensor_origin_.z() << " 1 0 0 0\nPOINTS "
          << cloud.size() << "\nDATA binary\n";
@@ -173,6 +174,7 @@ void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
     writeLittleEndian(stream, point.intensity);
     writeLittleEndian(stream, point.support);
     writeLittleEndian(stream, point.sigma);
+    writeLittleEndian(stream, point.probability);
   }
 }
 

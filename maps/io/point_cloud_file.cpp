@@ -153,7 +153,8 @@ void writePlyTo(std::ostream& stream, const MapCloud& cloud,
          << "\nproperty double x\nproperty double y\nproperty double z\n";
   if (!views.empty()) header << "property float nx\nproperty float ny\nproperty float nz\n";
   header << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-            "property float confidence\nproperty uint support\nend_header\n";
+            "property float confidence\nproperty uint support\nproperty float probability\n"
+            "end_header\n";
   stream << header.str();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const MapPoint& point = cloud[i];
@@ -172,6 +173,7 @@ void writePlyTo(std::ostream& stream, const MapCloud& cloud,
     for (const std::uint8_t value : colours[i]) writeLittleEndian(stream, value);
     writeLittleEndian(stream, point.intensity);
     writeLittleEndian(stream, point.support);
+    writeLittleEndian(stream, point.probability);
   }
 }
 

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <ostream>
 #include <stdexcept>
 #include <string_view>
@@ -35,9 +36,10 @@ using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 
 /// Returns the points with a confidence. (MRPT's clouds may also have points of intensity 0.)
-/// @param sigma standard deviation of the depth of each point, metres; empty: not known.
-std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI& cloud,
-                                                           const std::vector<float>& sigma = {}) {
+/// @param sigma, probability see ViewPoint; one per point, or empty: not known.
+std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(
+    const CPointsMapXYZI& cloud, const std::vector<float>& sigma = {},
+    const std::vector<float>& probability = {}) {
   const auto& x = cloud.getPointsBufferRef_x();
   const auto& y = cloud.getPointsBufferRef_y();
   const auto& z = cloud.getPointsBufferRef_z();
@@ -48,6 +50,7 @@ std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI&
     if (confidence[i] == 0) continue;
     points->push_back({{x[i], y[i], z[i]}, confidence[i]});
     if (!sigma.empty()) points->back().sigma = sigma.at(i);
+    if (!probability.empty()) points->back().probability = probability.at(i);
   }
   return points;
 }
@@ -89,29 +92,39 @@ void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
   options.max_contradictions = in.ReadAs<std::int32_t>();
 }
 
-/// Reads the points of a keyframe. Maps of versions 0 and 1 had no sigma.
+/// Reads a number for each point; none if they are not known.
+std::vector<float> readNumbers(mrpt::serialization::CArchive& in, std::size_t points,
+                               const char* name) {
+  std::vector<float> numbers;
+  in >> numbers;
+  if (!numbers.empty() && numbers.size() != points) {
+    throw std::runtime_error(
+        fmt::format("an event fusion map with {} {} for {} points", numbers.size(), name, points));
+  }
+  return numbers;
+}
+
+/// Reads the points of a keyframe. Maps of versions 0 and 1 had no sigma, 0 to 2 no probability.
 std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CArchive& in,
                                                          std::uint8_t version) {
   CPointsMapXYZI cloud;
   in >> cloud;
   std::vector<float> sigma;
-  if (version >= 2) in >> sigma;
-  if (!sigma.empty() && sigma.size() != cloud.size()) {
-    throw std::runtime_error(fmt::format("an event fusion map with {} sigmas for {} points",
-                                         sigma.size(), cloud.size()));
-  }
-  return viewPointsOf(cloud, sigma);
+  std::vector<float> probability;
+  if (version >= 2) sigma = readNumbers(in, cloud.size(), "sigmas");
+  if (version >= 3) probability = readNumbers(in, cloud.size(), "probabilities");
+  return viewPointsOf(cloud, sigma, probability);
 }
 
-/// Returns the sigma of each point. Empty if none is known, because a simplemap cannot store sigma.
-std::vector<float> sigmaOf(const std::vector<ViewPoint>& points) {
-  std::vector<float> sigma;
+/// Returns a number of each point. Empty if none is known: a simplemap cannot store them.
+std::vector<float> numbersOf(const std::vector<ViewPoint>& points, float ViewPoint::*number) {
+  std::vector<float> numbers;
   bool is_known = false;
   for (const ViewPoint& point : points) {
-    sigma.push_back(point.sigma);
-    is_known = is_known || point.sigma == point.sigma;
+    numbers.push_back(point.*number);
+    is_known = is_known || !std::isnan(point.*number);
   }
-  return is_known ? sigma : std::vector<float>();
+  return is_known ? numbers : std::vector<float>();
 }
 
 }  // namespace
@@ -279,7 +292,7 @@ double CEventFusionMap::internal_computeObservationLikelihood(
   return 0;
 }
 
-std::uint8_t CEventFusionMap::serializeGetVersion() const { return 2; }
+std::uint8_t CEventFusionMap::serializeGetVersion() const { return 3; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
   const GlobalCloudOptions& options = cloud_.options();
@@ -296,14 +309,15 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
     const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
-        << *cloudOf(keyframe) << sigmaOf(*keyframe.points);
+        << *cloudOf(keyframe) << numbersOf(*keyframe.points, &ViewPoint::sigma)
+        << numbersOf(*keyframe.points, &ViewPoint::probability);
   }
 }
 
 void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
-  if (version > 2) {
+  if (version > 3) {
     throw std::runtime_error(fmt::format(
-        "an event fusion map of version {}: this program reads versions 0 to 2", version));
+        "an event fusion map of version {}: this program reads versions 0 to 3", version));
   }
   GlobalCloudOptions options;
   in >> genericMapParams >> options.voxel_size_m;

@@ -80,6 +80,7 @@ std::string unknownKey(std::string_view section, std::string_view key) {
       {"fusion", "revote_power", "was removed with re-voting"},
       {"keyframes", "min_visible_share", "is called min_visible_fraction now"},
       {"depth", "min_excess", "is called min_local_contrast now"},
+      {"depth", "min_quality", "was replaced by min_probability (0 to below 1; the default is 0.9)"},
   };
   for (const auto& former : kFormerKeys) {
     if (former.section == section && former.key == key) return former.error;

@@ -74,13 +74,13 @@ namespace {
 void warnOfNoPoints(MapReport& report) {
   if (report.counts.keyframes == 0 || report.points > 0) return;
   const PixelCounts& pixels = report.pixels;
-  const std::uint64_t depths =
-      pixels.candidates - pixels.at_nearest - pixels.at_farthest - pixels.ambiguous;
+  const std::uint64_t depths = pixels.candidates - pixels.at_nearest - pixels.at_farthest -
+                               pixels.ambiguous + pixels.neighbours;
   addWarning(
       report.warnings, "no-points",
       "the map has no point: of {} pixels with contrast, {} fit best to the nearest plane and "
       "{} to the farthest ([dsi] min_depth_m, max_depth_m), {} are ambiguous (the parallax is "
-      "small: [keyframes] window_s; [depth] min_quality), and {} with a depth were removed "
+      "small: [keyframes] window_s; [depth] min_probability), and {} with a depth were removed "
       "([map] min_keyframes, outlier_radius_m); or the calibration and the poses do not "
       "explain the events",
       pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths);

@@ -82,7 +82,7 @@ void addSilence(const SessionStatus& status, bool exclude_silent, Warnings& warn
                status.silent_keyframes[c], status.counts.keyframes,
                exclude_silent
                    ? "the others were fused without it"
-                   : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
+                   : "rules that ask all cameras (min, harmonic, geometric, pairs of two) find nothing there "
                      "([rig] exclude_silent leaves silent cameras out)");
   }
   if (status.counts.silent_subintervals > 0) {

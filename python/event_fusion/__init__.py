@@ -18,7 +18,7 @@ except ImportError as error:
 from . import _engine, evaluate
 from ._engine import EVENT_DTYPE, Camera, Keyframe, simulation_presets
 from ._events import EventFusionWarning, events
-from ._mapping import Dsi, Map, Mapper, dsi, map
+from ._mapping import Candidates, Dsi, Map, Mapper, candidates, dsi, map
 from ._recording import Recording, open, simulate
 
 __version__ = _engine.VERSION
@@ -26,12 +26,14 @@ __version__ = _engine.VERSION
 __all__ = [
     "EVENT_DTYPE",
     "Camera",
+    "Candidates",
     "Dsi",
     "EventFusionWarning",
     "Keyframe",
     "Map",
     "Mapper",
     "Recording",
+    "candidates",
     "dsi",
     "evaluate",
     "events",

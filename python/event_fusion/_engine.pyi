@@ -55,6 +55,8 @@ class Keyframe:
     @property
     def sigma(self) -> npt.NDArray[np.float32]: ...
     @property
+    def probability(self) -> npt.NDArray[np.float32]: ...
+    @property
     def pose(self) -> npt.NDArray[np.float64]: ...
     @property
     def K(self) -> npt.NDArray[np.float64]: ...
@@ -135,6 +137,14 @@ def run_map(
     on_keyframe: _OnKeyframe,
     on_progress: _OnProgress,
 ) -> MapResult: ...
+def run_candidates(
+    source: Source,
+    options: Options,
+    t0_ns: int,
+    t1_ns: int,
+    t_ref_ns: Optional[int],
+    on_progress: _OnProgress,
+) -> tuple[_Array, _Array, Keyframe]: ...
 def run_dsi(
     source: Source,
     options: Options,

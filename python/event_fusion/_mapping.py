@@ -12,7 +12,7 @@ import threading
 import warnings as python_warnings
 import weakref
 from functools import cached_property
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterator, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -201,7 +201,7 @@ class Mapper:
 
     @property
     def points(self) -> Array:
-        """The map so far, a copy: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres)."""
+        """The map so far, a copy: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres), probability."""
         return self._mapper.points()
 
     @property
@@ -362,7 +362,7 @@ class Map:
 
     @cached_property
     def points(self) -> Array:
-        """The map: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres)."""
+        """The map: a structured array with x, y, z (metres, world, float64), intensity, support, sigma (metres), probability."""
         return self._finished().points
 
     @property
@@ -487,6 +487,18 @@ def _span(recording: Recording) -> tuple[int, int]:
     return max(min(of_events)[0], of_poses[0][0]), min(max(last for _, last in of_events), of_poses[0][1])
 
 
+def _window(
+    recording: Recording | Path, t0: int | str | None, t1: int | str | None, t_ref: int | str | None
+) -> tuple[_engine.Source, tuple[int, int, int | None]]:
+    """Return a recording's source, and the times of a window of it."""
+    opened = _opened(recording)
+    t0_ns, t1_ns, t_ref_ns = times_in(opened._source, t0=t0, t1=t1, t_ref=t_ref)
+    if t0_ns is None or t1_ns is None:
+        first_ns, last_ns = _span(opened)
+        t0_ns, t1_ns = first_ns if t0_ns is None else t0_ns, last_ns + 1 if t1_ns is None else t1_ns
+    return opened._source, (t0_ns, t1_ns, t_ref_ns)
+
+
 def dsi(
     recording: Recording | Path,
     t0: int | str | None = None,
@@ -519,15 +531,50 @@ def dsi(
     OSError
         If the recording cannot be read, or the window has no keyframe.
     """
-    opened = _opened(recording)
-    source = opened._source
-    t0_ns, t1_ns, t_ref_ns = times_in(source, t0=t0, t1=t1, t_ref=t_ref)
-    if t0_ns is None or t1_ns is None:
-        first_ns, last_ns = _span(opened)
-        t0_ns, t1_ns = first_ns if t0_ns is None else t0_ns, last_ns + 1 if t1_ns is None else t1_ns
+    source, times = _window(recording, t0, t1, t_ref)
     checked = engine_options(options)
     with ProgressBar(progress) as on_progress:
-        values, depths, keyframe, contrast = _engine.run_dsi(source, checked, t0_ns, t1_ns, t_ref_ns, on_progress)
+        values, depths, keyframe, contrast = _engine.run_dsi(source, checked, *times, on_progress)
     made = Dsi((values, depths))
     made.keyframe, made.contrast = keyframe, contrast
     return made
+
+
+class Candidates(NamedTuple):
+    """What decides on the depths of a window: structured arrays, one record for each pixel that could have a depth.
+
+    Their fields: x, y; depth and sigma (metres); probability (0: the pixel is never kept); inputs, of the network that
+    gives the probability: see mapping/depth/depth_probability.h.
+
+    Attributes
+    ----------
+    candidates : numpy.ndarray
+        Pixels whose local contrast is above ``depth.min_local_contrast``; 7 inputs.
+    neighbours : numpy.ndarray
+        Pixels beside them, and candidates without a depth of their own (``depth.neighbours``); 6 inputs.
+    keyframe : Keyframe
+        The depth map of the window, as `Dsi.keyframe`.
+    """
+
+    candidates: Array
+    neighbours: Array
+    keyframe: Keyframe
+
+
+def candidates(
+    recording: Recording | Path,
+    t0: int | str | None = None,
+    t1: int | str | None = None,
+    options: Options | None = None,
+    *,
+    t_ref: int | str | None = None,
+    progress: Progress = False,
+) -> Candidates:
+    """Map one window and return all pixels that could have a depth, kept or not: for experiments with probabilities.
+
+    scripts/fit_probability.py of the source fits the probabilities with it. Arguments and errors are those of `dsi`.
+    """
+    source, times = _window(recording, t0, t1, t_ref)
+    checked = engine_options(options)
+    with ProgressBar(progress) as on_progress:
+        return Candidates(*_engine.run_candidates(source, checked, *times, on_progress))

@@ -75,7 +75,8 @@ class Interruption : public AppTest {
       for (const StampedPose& pose : poses) {
         const std::string folder = "keyframes/" + formatSeconds(pose.t_ns);
         expected.insert({folder, folder + "/depth.tiff", folder + "/depth.png",
-                         folder + "/confidence.tiff", folder + "/confidence.png"});
+                         folder + "/confidence.tiff", folder + "/probability.tiff",
+                         folder + "/confidence.png"});
       }
       EXPECT_EQ(readPointCloud(out() / "map.pcd").points.size(), report["points"]);
     }

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
+
+#include "mapping/depth/probability_weights.h"
 
 namespace efm::oracle {
 namespace {
@@ -19,6 +22,9 @@ struct Pixel {
   bool at_end = false;
   std::vector<double> sum;  // by plane
   int peak = 0;
+  double p = 0;            // that its depth is right
+  bool has_depth = false;  // it may be kept
+  double variance = 0;
 };
 
 class NaiveAggregation {
@@ -33,20 +39,29 @@ class NaiveAggregation {
     for (std::size_t i = 0; i < seen_.size(); ++i) aggregate(seen_[i], pixels_[i]);
 
     const int of_peak = beside();
-    DepthMap map{cv::Mat1f::zeros(size_), confidence, cv::Mat1f::zeros(size_)};
+    DepthMap map{cv::Mat1f::zeros(size_), confidence, cv::Mat1f::zeros(size_),
+                 cv::Mat1f::zeros(size_)};
     for (std::size_t i = 0; i < seen_.size(); ++i) {
-      const auto [median, spread, share] = agreement(i);
-      const Pixel& pixel = pixels_[i];
-      if (planes_ > 2 && pixel.at_end) continue;
-      const double quality = pixel.excess *
-                             std::pow(std::max(0.0, 1 - ambiguity(pixel, of_peak)), 1.25) *
-                             std::exp(-std::abs(pixel.position - median) / (10 * place_)) * share;
-      if (quality <= options.min_quality) continue;
-      const double variance = 0.09 * 0.09 + 0.0143 * pixel.width_sq * (spread + 0.03);
-      const double step = depths.inverseDepthStepAt(median);
-      map.depth(seen_[i]) = static_cast<float>(depths.depthAt(median));
-      map.variance(seen_[i]) =
-          static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
+      const auto [median, spread, share, count] = agreement(i);
+      Pixel& pixel = pixels_[i];
+      const double second = ambiguity(pixel, of_peak);
+      const bool at_end = planes_ > 2 && pixel.at_end;
+      pixel.p = probability(
+          kCandidateNetwork,
+          {std::log(pixel.excess), std::log(1.01 - std::min(second, 0.999)), std::log(share + 0.05),
+           std::log(1.0 + count), std::log(spread / place_ + 0.1),
+           std::log(std::min(std::sqrt(pixel.width_sq) / place_, 50.0) + 0.1),
+           std::log(tenPercent(median, depths))});
+      pixel.has_depth = !at_end && second < 0.98 && count > 0;
+      if (planes_ <= 2) pixel.p = std::numeric_limits<double>::quiet_NaN();
+      pixel.variance = 0.09 * 0.09 + 0.0143 * pixel.width_sq * (spread + 0.03);
+      if (pixel.has_depth) {
+        keep(seen_[i], median, pixel.variance, pixel.p, options, depths, map);
+      }
+      if (at_end || second >= 0.98) pixel.p = 0.01;
+    }
+    if (options.neighbours && planes_ > 2) {
+      forEach([&](cv::Point at) { addNeighbour(at, confidence, options, depths, map); });
     }
     return map;
   }
@@ -56,7 +71,81 @@ class NaiveAggregation {
     double median = 0;
     double spread = 0;
     double share = 0;
+    int count = 0;  // of agreeing others
   };
+
+  double tenPercent(double position, const DepthPlanes& depths) const {
+    return 0.1 / depths.depthAt(position) / depths.inverseDepthStepAt(position) / place_;
+  }
+  static void keep(cv::Point at, double position, double variance, double p,
+                   const DepthExtractionOptions& options, const DepthPlanes& depths,
+                   DepthMap& map) {
+    if (p <= options.min_probability) return;
+    const double step = depths.inverseDepthStepAt(position);
+    map.depth(at) = static_cast<float>(depths.depthAt(position));
+    map.variance(at) = static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
+    map.probability(at) = static_cast<float>(p);
+  }
+
+  /// Gives a pixel without a depth of its own the median of the candidates around it.
+  void addNeighbour(cv::Point at, const cv::Mat1f& confidence,
+                    const DepthExtractionOptions& options, const DepthPlanes& depths,
+                    DepthMap& map) const {
+    const bool in_frame =
+        at.x < 2 || at.y < 2 || at.x >= size_.width - 2 || at.y >= size_.height - 2;
+    if (in_frame || !(confidence(at) > 0)) return;
+    double beside = 0;
+    double variance = std::numeric_limits<double>::infinity();
+    bool touches = false;
+    bool has_depth = false;
+    std::vector<std::pair<double, double>> around;  // position, weight
+    std::vector<std::pair<double, double>> others;  // position, probability
+    forEachAround(at, [&](std::size_t i, double distance_sq) {
+      const Pixel& pixel = pixels_[i];
+      around.emplace_back(pixel.position, pixel.excess);
+      touches = touches || distance_sq <= 2;
+      if (distance_sq == 0) has_depth = pixel.has_depth;
+      if (distance_sq == 0) return;
+      others.emplace_back(pixel.position, pixel.p);
+      if (distance_sq > 2 || pixel.p <= beside) return;
+      beside = pixel.p;
+      variance = 1.5 * pixel.variance;
+    });
+    if (!touches || has_depth) return;
+    const auto [median, spread] = medianAndSpread(around);
+    double near = 0;
+    double far = 0;
+    for (const auto& [position, p] : others) {
+      (std::abs(position - median) < 2.5 * place_ ? near : far) += p;
+    }
+    double mean = 0;
+    int voted = 0;
+    forEach([&](cv::Point pixel) {
+      mean += double{confidence(pixel)};
+      voted += confidence(pixel) > 0 ? 1 : 0;
+    });
+    mean /= voted;
+    const double p = probability(
+        kNeighbourNetwork, {std::log(double{confidence(at)} / mean + 0.02), std::log(near + 0.05),
+                            std::log(far + 0.05), std::log(spread / place_ + 0.1),
+                            std::log(beside + 0.02), std::log(tenPercent(median, depths))});
+    keep(at, median, variance, p, options, depths, map);
+  }
+
+  /// The network in double, one hidden unit after the other.
+  template <typename Net>
+  static double probability(const Net& net, const std::vector<double>& inputs) {
+    double logit = double{net.b2};
+    for (std::size_t j = 0; j < net.b1.size(); ++j) {
+      double sum = double{net.b1[j]};
+      for (std::size_t i = 0; i < inputs.size(); ++i) {
+        const double z = (inputs[i] - double{net.mean[i]}) / double{net.sd[i]};
+        sum += double{net.w1[i][j]} * std::max(-5.0, std::min(5.0, z));
+      }
+      logit += double{net.w2[j]} * std::tanh(sum);
+    }
+    return 1 / (1 + std::exp(-logit));
+  }
 
   template <typename Visit>
   void forEach(const Visit& visit) const {
@@ -172,32 +261,37 @@ class NaiveAggregation {
     return second / pixel.sum[static_cast<std::size_t>(pixel.peak)];
   }
 
-  Agreement agreement(std::size_t of) const {
-    std::vector<std::pair<double, double>> around;  // position, weight
+  static std::pair<double, double> medianAndSpread(std::vector<std::pair<double, double>> around) {
     double total = 0;
-    double agreeing = 0;
-    double others = 0;
-    forEachAround(seen_[of], [&](std::size_t i, double distance_sq) {
-      around.emplace_back(pixels_[i].position, pixels_[i].excess);
-      total += pixels_[i].excess;
-      if (i == of) return;
-      const double weight = pixels_[i].excess * std::exp(-distance_sq / (2 * 2.0 * 2.0));
-      others += weight;
-      if (std::abs(pixels_[i].position - pixels_[of].position) < 2.5 * place_) agreeing += weight;
-    });
+    for (const auto& [position, weight] : around) total += weight;
     std::sort(around.begin(), around.end());
-    Agreement found;
+    double median = 0;
     double below = 0;
     for (const auto& [position, weight] : around) {
-      if (below < total / 2) found.median = position;
+      if (below < total / 2) median = position;
       below += weight;
     }
     std::vector<double> distances;
-    for (const auto& [position, weight] : around) {
-      distances.push_back(std::abs(position - found.median));
-    }
+    for (const auto& [position, weight] : around) distances.push_back(std::abs(position - median));
     std::sort(distances.begin(), distances.end());
-    found.spread = distances[distances.size() / 2];
+    return {median, distances[distances.size() / 2]};
+  }
+
+  Agreement agreement(std::size_t of) const {
+    std::vector<std::pair<double, double>> around;  // position, weight
+    double agreeing = 0;
+    double others = 0;
+    Agreement found;
+    forEachAround(seen_[of], [&](std::size_t i, double distance_sq) {
+      around.emplace_back(pixels_[i].position, pixels_[i].excess);
+      if (i == of) return;
+      const double weight = pixels_[i].excess * std::exp(-distance_sq / (2 * 2.0 * 2.0));
+      others += weight;
+      if (std::abs(pixels_[i].position - pixels_[of].position) >= 2.5 * place_) return;
+      agreeing += weight;
+      ++found.count;
+    });
+    std::tie(found.median, found.spread) = medianAndSpread(around);
     found.share = others > 0 ? agreeing / others : 0;
     return found;
   }

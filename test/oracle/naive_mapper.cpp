@@ -77,6 +77,17 @@ Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& u
   return dsi;
 }
 
+namespace {
+
+/// Returns the sum of the harmonic means of the first value with each other.
+double pairs(const std::vector<double>& values) {
+  double sum = 0;
+  for (std::size_t k = 1; k < values.size(); ++k) sum += 2 / (1 / values[0] + 1 / values[k]);
+  return sum;
+}
+
+}  // namespace
+
 double fuse(FusionRule rule, const std::vector<double>& values) {
   const auto n = static_cast<double>(values.size());
   double sum = 0;
@@ -94,6 +105,8 @@ double fuse(FusionRule rule, const std::vector<double>& values) {
       return *std::min_element(values.begin(), values.end());
     case FusionRule::kHarmonic:
       return n / reciprocals;
+    case FusionRule::kPairs:
+      return values.size() == 1 ? values[0] : pairs(values);
     case FusionRule::kGeometric:
       return std::pow(product, 1 / n);
     case FusionRule::kArithmetic:

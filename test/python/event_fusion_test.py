@@ -88,7 +88,7 @@ def test_all_ways_give_the_map_of_the_program(desk, by_program, made):
     mapper.finish()
     assert len(by_program) > 1000
     for points in (from_file.points, mapper.points, made.points):
-        for name in ("x", "y", "z", "intensity", "support", "sigma"):
+        for name in ("x", "y", "z", "intensity", "support", "sigma", "probability"):
             np.testing.assert_array_equal(points[name], by_program[name], name)
     assert [k.t for k in keyframes] == [k.t for k in made] == list(from_file.trajectory[0])
     np.testing.assert_array_equal(keyframes[0].depth, made.keyframes[0].depth)
@@ -162,9 +162,38 @@ def test_keyframes_can_be_pickled(made):
     copy = pickle.loads(pickle.dumps(keyframe))
     for name in ("t", "window"):
         assert getattr(copy, name) == getattr(keyframe, name)
-    for name in ("depth", "confidence", "sigma", "pose", "K"):
+    for name in ("depth", "confidence", "sigma", "probability", "pose", "K"):
         np.testing.assert_array_equal(getattr(copy, name), getattr(keyframe, name), name)
     np.testing.assert_array_equal(copy.points(), keyframe.points())
+    constructor, arguments, state = keyframe.__reduce_ex__(2)[:3]
+    older = constructor(*arguments)
+    older.__setstate__(state[:8])  # of a version without probabilities
+    assert np.array_equal(np.isnan(older.probability), keyframe.depth > 0)
+    assert np.all(older.probability[keyframe.depth == 0] == 0)
+
+
+def test_candidates_are_the_pixels_that_could_have_a_depth(desk):
+    t0, t1 = "1.5", "1.75"
+    options = {**OPTIONS, "depth.min_probability": 0.8, "depth.neighbours": True}
+    found = ef.candidates(desk, t0, t1, options)
+    dsi = ef.dsi(desk, t0, t1, options)
+    np.testing.assert_array_equal(found.keyframe.depth, dsi.keyframe.depth)
+    y, x = found.candidates["y"], found.candidates["x"]
+    inner = np.zeros(dsi.contrast.shape, bool)
+    inner[2:-2, 2:-2] = True
+    assert {*zip(*np.nonzero(inner & (dsi.contrast > 0.15)))} == {*zip(y, x)}
+    np.testing.assert_allclose(found.candidates["inputs"][:, 0], np.log(dsi.contrast[y, x]), rtol=0, atol=1e-5)
+    expected = np.zeros_like(dsi.keyframe.depth)
+    for of, inputs in ((found.candidates, 7), (found.neighbours, 6)):
+        assert of["inputs"].shape == (len(of), inputs)
+        kept = of[of["probability"] > 0.8]
+        assert len(kept) > 1000
+        expected[kept["y"], kept["x"]] = kept["depth"]
+        np.testing.assert_array_equal(found.keyframe.probability[kept["y"], kept["x"]], kept["probability"])
+        np.testing.assert_allclose(found.keyframe.sigma[kept["y"], kept["x"]], kept["sigma"], rtol=1e-3)
+    np.testing.assert_array_equal(expected, found.keyframe.depth)
+    with pytest.raises(ValueError, match="depth.extraction"):
+        ef.candidates(desk, t0, t1, {"depth.extraction": "paper"})
 
 
 def test_events_come_in_chunks_of_any_size(desk):
@@ -692,7 +721,8 @@ def test_python_ends_while(name):
 
 
 def test_warnings_are_warnings_of_python(desk):
-    inverted = ef.map(ef.open(DESK, poses=os.path.join(DESK, "poses.txt")), {**OPTIONS, "dsi.max_depth_m": 0.7})
+    options = {**OPTIONS, "dsi.max_depth_m": 0.7, "depth.min_probability": 0}
+    inverted = ef.map(ef.open(DESK, poses=os.path.join(DESK, "poses.txt")), options)
     with pytest.warns(ef.EventFusionWarning, match="depths-at-limit"):
         inverted.points
 

@@ -46,7 +46,7 @@ struct Comparison {
   double points() const { return std::min(hand_points, chosen_points); }
 };
 
-constexpr double kShippedQuality = 0.05;
+constexpr double kShippedProbability = 0.9;
 
 Choice chosenFrom(const Rig& rig, const std::vector<WindowSample>& samples, double duration_s,
                   const std::vector<int>& cameras) {
@@ -122,14 +122,14 @@ Comparison compareOnSlider(const StudyRun& run, const Case& what) {
       sliderTruth(folder, any.view, any.T_world_ref, any.window.t_ref_ns, frames);
   const auto measure = [&](const Choice& choice, DepthCurve& curve, double& points) {
     options.planes = choice.planes;
-    for (const double quality : {0.4, 0.2, 0.1, kShippedQuality, 0.03, 0.01}) {
-      options.extraction = withThreshold(options.extraction, quality);
+    for (const double probability : {0.995, 0.98, 0.95, kShippedProbability, 0.7, 0.4}) {
+      options.extraction = withThreshold(options.extraction, probability);
       const SliderScore score = scoreOnSlider(sliderKeyframe(recording, options).map.depth, truth);
       PointQuality& step = curve.steps.emplace_back();
       step.points = static_cast<double>(score.with_truth);
       step.beyond_10 = score.beyond_10;
       step.median = score.median_error;
-      if (quality == kShippedQuality) points = step.points;
+      if (probability == kShippedProbability) points = step.points;
     }
   };
   measure(result.by_hand, result.hand_curve, result.hand_points);

@@ -24,8 +24,8 @@ namespace efm {
 namespace {
 
 /// The images of one depth map.
-constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
-                                                     "confidence.png"};
+constexpr std::array<std::string_view, 5> kImages = {
+    "depth.tiff", "confidence.tiff", "probability.tiff", "depth.png", "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
 // Removed first: without the report, the remaining files do not look like a complete result.
 constexpr const char* kReport = "report.json";
@@ -302,6 +302,7 @@ void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& ima
 void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) {
   writeImage(folder / "depth.tiff", map.depth);
   writeImage(folder / "confidence.tiff", map.confidence);
+  writeImage(folder / "probability.tiff", map.probability);
   const bool plain = style_ == PictureStyle::kPlain;
   writeImage(folder / "depth.png", plain ? depthPicture(map.depth, limits_, Palette::kBlueToRed)
                                          : depthFigure(map, limits_));

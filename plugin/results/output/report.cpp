@@ -225,7 +225,8 @@ std::string reportJson(const MapReport& report) {
   json["pixels"] = {{"candidates", pixels.candidates},
                     {"at_nearest", pixels.at_nearest},
                     {"at_farthest", pixels.at_farthest},
-                    {"ambiguous", pixels.ambiguous}};
+                    {"ambiguous", pixels.ambiguous},
+                    {"neighbours", pixels.neighbours}};
   if (report.extent) json["extent_m"] = asJson(*report.extent);
   if (report.most_extent) json["most_extent_m"] = asJson(*report.most_extent);
   json["recording_seconds"] = report.recording_s;

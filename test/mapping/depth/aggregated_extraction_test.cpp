@@ -101,7 +101,8 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
       const DepthPlanes depths = planesOf(planes);
       DepthExtractionOptions options;
       options.threshold_kernel = window;
-      options.min_quality = 0.03 * window;
+      options.min_probability = 0.2 + 0.03 * window;
+      options.neighbours = window > 3;
       const DepthMap found = extractAggregated(dsi.swept(), depths, options, parallax_px_m);
       const DepthMap exact =
           oracle::extractAggregated(dsi.rounded().values, size, depths, options, step_planes);
@@ -122,7 +123,10 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
           const bool same_variance =
               std::isinf(variance) ? std::isinf(found.variance(y, x))
                                    : std::abs(found.variance(y, x) - variance) < 0.01 * variance;
-          differing += same_depth && same_variance ? 0 : 1;
+          const bool same_probability =
+              planes > 2 ? std::abs(found.probability(y, x) - exact.probability(y, x)) < 0.005F
+                         : std::isnan(found.probability(y, x));
+          differing += same_depth && same_variance && same_probability ? 0 : 1;
         }
       }
       EXPECT_GT(kept, kept_before + 40) << planes << " planes, window " << window;
@@ -139,17 +143,25 @@ TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsColumnIsFlat)
   for (double& value : flat) value = 1 + noise(random);
   flat[50] = 1.011;  // the peak is here by chance
   const auto ray = [&](int plane) { return 20 * flat[static_cast<std::size_t>(plane)]; };
-  EXPECT_EQ(cv::countNonZero(extract(edges({60, 40}, 100, ray)).depth), 0);
+  for (const bool neighbours : {false, true}) {
+    DepthExtractionOptions options;
+    options.neighbours = neighbours;
+    EXPECT_EQ(cv::countNonZero(extract(edges({60, 40}, 100, ray), options).depth), 0);
+  }
 }
 
-TEST(AggregatedExtraction, TheContrastThresholdAndDilationAreThoseOfTheOptions) {
+TEST(AggregatedExtraction, TheContrastThresholdAndTheNeighboursAreThoseOfTheOptions) {
   const ChosenDsi dsi = randomEdges(9, {64, 37}, 100);
   DepthExtractionOptions options;
+  options.min_probability = 0.5;
+  options.neighbours = false;
   const DepthMap kept = extract(dsi, options);
-  options.dilate = true;
+  options.neighbours = true;
   const DepthMap grown = extract(dsi, options);
   EXPECT_GT(cv::countNonZero(grown.depth), cv::countNonZero(kept.depth) + 100);
   EXPECT_EQ(cv::countNonZero((grown.depth != kept.depth) & (kept.depth > 0)), 0);
+  EXPECT_EQ(grown.pixels.neighbours, static_cast<std::uint64_t>(cv::countNonZero(grown.depth) -
+                                                                cv::countNonZero(kept.depth)));
   options.min_local_contrast = 1e6;
   EXPECT_EQ(cv::countNonZero(extract(dsi, options).depth), 0);
 }
@@ -223,6 +235,7 @@ Depths randomDepths(std::uint32_t seed, const cv::Size& size, int one_of) {
 LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
   std::vector<std::pair<double, double>> around;  // position, weight
   double agreeing = 0;
+  int agreeing_count = 0;
   double others = 0;
   double total = 0;
   for (int y = 0; y < depths.mask.rows; ++y) {
@@ -239,6 +252,7 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
       others += distance_weight;
       if (std::abs(position - double{depths.positions(pixel)}) < double{kNear}) {
         agreeing += distance_weight;
+        ++agreeing_count;
       }
     }
   }
@@ -255,7 +269,7 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
   for (const auto& [position, weight] : around) distances.push_back(std::abs(position - median));
   std::sort(distances.begin(), distances.end());
   return {static_cast<float>(median), static_cast<float>(distances[distances.size() / 2]),
-          static_cast<float>(others > 0 ? agreeing / others : 0)};
+          static_cast<float>(others > 0 ? agreeing / others : 0), agreeing_count};
 }
 
 TEST(LocalAgreement, EqualsTheNaiveOneOnDenseAndSparsePixels) {
@@ -269,6 +283,7 @@ TEST(LocalAgreement, EqualsTheNaiveOneOnDenseAndSparsePixels) {
         ASSERT_EQ(found[i].median, exact.median);
         ASSERT_NEAR(found[i].spread, exact.spread, 1e-5);
         ASSERT_NEAR(found[i].agreeing_fraction, exact.agreeing_fraction, 1e-5);
+        ASSERT_EQ(found[i].agreeing, exact.agreeing);
       });
     }
   }

@@ -77,6 +77,7 @@ std::vector<DepthExtractionOptions> manyOptions() {
         options.threshold_kernel = kernel;
         options.threshold_c = c;
         options.median_size = median;
+        options.extraction = ExtractionMethod::kPaper;
         options.dilate = median == 5 || median == 255;
         options.subplane = median != 3;
         if (c == 5) options.max_confidence.level = WhiteLevel::kSequence;

@@ -33,9 +33,10 @@ rc::Gen<std::vector<float>> densities() {
 
 /// Returns the mean of planes with one value each: the same bits in all voxels, otherwise NaN.
 /// @param in_place true if inputs are written to `next`.
-float meanOf(FusionRule rule, const std::vector<float>& inputs, bool in_place) {
+float meanOf(FusionRule rule, const std::vector<float>& inputs, bool in_place,
+             bool all_pairs = false) {
   constexpr std::size_t kVoxels = 37;  // not a multiple of any vector size
-  FusionAccumulator accumulator(rule, static_cast<int>(inputs.size()), kVoxels);
+  FusionAccumulator accumulator(rule, static_cast<int>(inputs.size()), kVoxels, all_pairs);
   for (const float input : inputs) {
     PlaneValues own(kVoxels);
     PlaneValues& plane = in_place ? accumulator.next() : own;
@@ -61,6 +62,22 @@ RC_GTEST_PROP(FusionRule, EveryRuleIsItsTextbookMean, ()) {
     RC_ASSERT(std::abs(meanOf(rule, inputs, false) - expected) <= kMeanRounding * expected);
     RC_ASSERT(meanOf(rule, inputs, true) == meanOf(rule, inputs, false));
     RC_ASSERT(isAndLike(rule) == (rule <= FusionRule::kGeometric));
+  }
+}
+
+RC_GTEST_PROP(FusionRule, PairsAreTheSumOfTheHarmonicMeansOfTheFirstOrOfAllInputs, ()) {
+  const auto inputs = *densities();
+  for (const bool all : {false, true}) {
+    double expected = inputs.size() == 1 ? double{inputs[0]} : 0;
+    for (std::size_t a = 0; a < inputs.size(); ++a) {
+      for (std::size_t b = a + 1; b < inputs.size(); ++b) {
+        if (a > 0 && !all) continue;
+        expected += oracle::fuse(FusionRule::kHarmonic, {double{inputs[a]}, double{inputs[b]}});
+      }
+    }
+    const float sum = meanOf(FusionRule::kPairs, inputs, false, all);
+    RC_ASSERT(std::abs(double{sum} - expected) <= kMeanRounding * expected);
+    if (inputs.size() < 3) RC_ASSERT(sum == meanOf(FusionRule::kHarmonic, inputs, true));
   }
 }
 

@@ -255,7 +255,7 @@ TEST(FusionMapper, SensorsDownToOnePixelAreMapped) {
       SCOPED_TRACE(testing::Message() << size);
       FusionMapperOptions small = period();
       small.keyframe.extraction.extraction = extraction;
-      small.keyframe.extraction.dilate = true;
+      small.keyframe.extraction.neighbours = true;
       small.keyframe.camera_maps = true;
       small.keyframe.event_images = true;
       test::RandomScene random(1);

@@ -347,6 +347,7 @@ Found mapPoints(const ViewCase& view_case) {
   // No median is used: in pixels beside an isolated point, its rays cross a little nearer or
   // farther than the point.
   options.extraction.median_size = 1;
+  options.extraction.min_probability = 0;  // lone points are no edges
   view_case.change(options);
   const Window window = windowOf(kStart_ns, kStart_ns + kDuration_ns, view_case.reference);
   const auto camera = static_cast<std::size_t>(options.reference_camera);

@@ -147,6 +147,48 @@ TEST_P(SpaceSweepOn, FromEventsTheDsiIsTheOraclesForAllRulesOrdersAndSplits) {
   }
 }
 
+/// Without the reference camera's events, all others make pairs. A silent camera adds nothing.
+TEST_P(SpaceSweepOn, PairsAreTheSumOfTheHarmonicSweepsOfTwoCameras) {
+  using Pairs = std::vector<std::vector<int>>;
+  const struct {
+    std::vector<int> selected;
+    int reference;
+    int silent;
+    Pairs pairs;
+  } cases[] = {{{0, 1, 2, 3}, 0, -1, {{0, 1}, {0, 2}, {0, 3}}},
+               {{0, 1, 2, 3}, 2, -1, {{2, 0}, {2, 1}, {2, 3}}},
+               {{1, 2, 3}, 0, -1, {{1, 2}, {1, 3}}},
+               {{0, 1, 2, 3}, 0, 1, {{0, 2}, {0, 3}}},
+               {{0, 1, 2, 3}, 1, 1, {{0, 2}, {0, 3}, {2, 3}}},
+               {{1, 3}, 0, -1, {{1, 3}}}};
+  for (const auto& c : cases) {
+    for (const bool exclude_silent : {false, true}) {
+      Recording recording(44, 4, 4000);
+      if (c.silent >= 0) recording.events[static_cast<std::size_t>(c.silent)].clear();
+      KeyframeMapperOptions options = exactOptions({true, 2}, 1);
+      options.sweep.kernel = GetParam();
+      options.reference_camera = c.reference;
+      options.exclude_silent = exclude_silent;
+      const auto dsi_of = [&](const std::vector<int>& cameras) {
+        KeyframeMapper mapper(recording.rig, cameras, options);
+        WholeDsi dsi(mapper.planes(), mapper.view());
+        EXPECT_TRUE(mapper.map(kWindow, recording.spans(), recording.trajectory, &dsi));
+        return dsi.values;
+      };
+      const std::vector<float> found = dsi_of(c.selected);
+      std::vector<double> sum(found.size());
+      for (const std::vector<int>& pair : c.pairs) {
+        const std::vector<float> of_pair = dsi_of(pair);
+        for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += double{of_pair[i]};
+      }
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        ASSERT_NEAR(found[i], sum[i], 1e-5 * sum[i])
+            << "reference " << c.reference << ", silent " << c.silent;
+      }
+    }
+  }
+}
+
 // ---------------------------------------------------------------- other results
 
 TEST(SpaceSweep, OptionsHaveTheirLimits) {

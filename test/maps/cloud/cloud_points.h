@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <vector>
 
@@ -13,7 +14,10 @@ inline bool sameBits(const MapCloud& a, const MapCloud& b) {
   return a.sensor_origin_ == b.sensor_origin_ &&
          std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const MapPoint& p, const MapPoint& q) {
-                      return std::memcmp(&p, &q, sizeof(MapPoint)) == 0;
+                      // The bytes after the last member are padding.
+                      constexpr std::size_t kBytes =
+                          offsetof(MapPoint, first_keyframe) + sizeof(p.first_keyframe);
+                      return std::memcmp(&p, &q, kBytes) == 0;
                     });
 }
 
@@ -22,7 +26,7 @@ inline std::vector<CloudPoint> worldPoints(const MapCloud& cloud) {
   std::vector<CloudPoint> points;
   for (const MapPoint& point : cloud) {
     points.push_back({positionIn(cloud, point), point.intensity, point.support,
-                      point.first_keyframe, point.sigma});
+                      point.first_keyframe, point.sigma, point.probability});
   }
   return points;
 }

@@ -26,11 +26,12 @@ TEST(MapPoint, HasItsFieldsInPcl) {
     names += field.name + (field.datatype == pcl::PCLPointField::UINT32 ? " (uint32) " : " ");
     EXPECT_EQ(field.count, 1U);
   }
-  EXPECT_EQ(names, "x y z intensity support (uint32) sigma ");
+  EXPECT_EQ(names, "x y z intensity support (uint32) sigma probability ");
   MapCloud copy;
   pcl::fromPCLPointCloud2(fields, copy);
   EXPECT_EQ(copy.at(0).support, 70'000U);
   EXPECT_TRUE(std::isnan(copy.at(0).sigma)) << "not known";
+  EXPECT_TRUE(std::isnan(copy.at(0).probability)) << "not known";
   EXPECT_EQ(copy.at(0).data[3], 1) << "PCL transforms points as homogeneous ones";
 }
 
@@ -50,7 +51,7 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
       {{450'123.4, 5'400'456.7, 100}, 10, {0, 0, 0}},
   };
   for (const Case& far : cases) {
-    const std::vector<CloudPoint> points = {{far.p_world, 2, 3, 4, 0.5F}};
+    const std::vector<CloudPoint> points = {{far.p_world, 2, 3, 4, 0.5F, 0.75F}};
     const MapCloud::ConstPtr cloud = mapCloudOf(points, far.resolution_m);
     EXPECT_EQ(cloud->sensor_origin_.head<3>(), far.origin) << far.p_world.transpose();
     EXPECT_LT((positionIn(*cloud, cloud->at(0)) - far.p_world).cwiseAbs().maxCoeff(),
@@ -59,6 +60,7 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
     EXPECT_EQ(cloud->at(0).first_keyframe, 4U);
     EXPECT_EQ(cloud->at(0).support, 3U);
     EXPECT_EQ(cloud->at(0).sigma, 0.5F);
+    EXPECT_EQ(cloud->at(0).probability, 0.75F);
     const auto step_m = coarseStepOf(*cloud, far.resolution_m);
     EXPECT_EQ(step_m.has_value(), !far.origin.isZero());
     // Floats have 24 bits: the step at 16385 is 2^(14 - 23).

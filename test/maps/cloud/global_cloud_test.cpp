@@ -26,18 +26,21 @@ std::vector<CloudPoint> randomPoints(std::mt19937& random, int count, double ext
   std::vector<CloudPoint> points;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d p_world(coordinate(random), coordinate(random), coordinate(random));
-    points.push_back({p_world, confidence(random), 1, 0, 0.01F * confidence(random)});
+    points.push_back({p_world, confidence(random), 1, 0, 0.01F * confidence(random),
+                      0.05F * confidence(random)});
   }
   return points;
 }
 
-TEST(GlobalCloud, TheErrorOfAPointWithoutOneIsNotKnown) {
+TEST(GlobalCloud, ErrorAndProbabilityOfAPointWithoutThemAreNotKnown) {
   GlobalCloud cloud({1.0, 1});
-  cloud.insert(1, {{{0.5, 0.5, 0.5}, 2, 1, 0, 0.6F}});
+  cloud.insert(1, {{{0.5, 0.5, 0.5}, 2, 1, 0, 0.6F, 0.75F}});
   cloud.insert(2, {{{0.5, 0.5, 0.5}, 1}});
   EXPECT_TRUE(std::isnan(cloud.points()->at(0).sigma));
+  EXPECT_TRUE(std::isnan(cloud.points()->at(0).probability));
   cloud.remove(2);
   EXPECT_EQ(cloud.points()->at(0).sigma, 0.6F);
+  EXPECT_EQ(cloud.points()->at(0).probability, 0.75F);
 }
 
 RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
@@ -56,6 +59,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
     double weight = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     int count = 0;
+    double probability = 0;                // weighted
     std::map<std::size_t, double> sigmas;  // weighted, per keyframe
   };
   std::map<std::array<long, 3>, Mean> means;
@@ -70,6 +74,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
       mean.weight += weight;
       mean.p += weight * point.p_world;
       ++mean.count;
+      mean.probability += weight * point.probability;
       mean.sigmas[k] += weight * point.sigma;
     }
   }
@@ -87,6 +92,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
     double squares = 0;  // errors are common within a keyframe only
     for (const auto& [keyframe, sigma] : mean.sigmas) squares += sigma * sigma;
     RC_ASSERT(std::abs(points[i].sigma - std::sqrt(squares) / mean.weight) < 1e-6);
+    RC_ASSERT(std::abs(points[i].probability - mean.probability / mean.weight) < 1e-6);
     ++i;
   }
 }

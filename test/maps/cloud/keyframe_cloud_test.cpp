@@ -31,6 +31,8 @@ TEST(KeyframeCloud, PointOfAPixelIsWorkedOutByHand) {
   keyframe.map.confidence(1, 2) = 7.0F;
   keyframe.map.variance = cv::Mat1f::ones(2, 3);
   keyframe.map.variance(1, 2) = 0.0025F;  // sigma of depth: 4^2 * sqrt(0.0025) = 0.8
+  keyframe.map.probability = cv::Mat1f::zeros(2, 3);
+  keyframe.map.probability(1, 2) = 0.95F;
   // Rotation by 90 deg about z: (x, y, z) -> (-y, x, z). Then a translation of (10, 20, 30).
   keyframe.T_world_ref.rotation = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
   keyframe.T_world_ref.translation = {10, 20, 30};
@@ -45,8 +47,11 @@ TEST(KeyframeCloud, PointOfAPixelIsWorkedOutByHand) {
   EXPECT_EQ(point.intensity, 7.0F);
   EXPECT_EQ(point.support, 1U);
   EXPECT_EQ(point.sigma, 0.8F);
+  EXPECT_EQ(point.probability, 0.95F);
   keyframe.map.variance.release();
+  keyframe.map.probability.release();
   EXPECT_TRUE(std::isnan(keyframeCloud(keyframe)->front().sigma)) << "without variances";
+  EXPECT_TRUE(std::isnan(keyframeCloud(keyframe)->front().probability)) << "not known";
 }
 
 TEST(KeyframeCloud, PixelsWithoutDepthOrConfidenceGiveNoPoint) {

@@ -122,6 +122,7 @@ TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
                                           {{449'999.5, 5'200'001, 2}, 0.25F, 70'000}};
   const MapCloud::Ptr cloud = mapCloudOf(points, 0.01);
   (*cloud)[1].first_keyframe = 1;
+  (*cloud)[1].probability = 0.75F;
   const std::vector<StampedPose> views = {{0, {{}, {450'000.125, 5'200'000.25, 7}}},
                                           {1, {{}, {449'999.5, 5'200'006, 2}}}};
   std::ofstream file(folder() / "map.ply", std::ios::binary);
@@ -132,11 +133,13 @@ TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
   for (int i = 0; i < 2; ++i) EXPECT_EQ(content.points[i].p_world, points[i].p_world);
   // The reader ignores the last bytes of a vertex.
   const std::string bytes = readBytes(folder() / "map.ply");
-  EXPECT_THAT(bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
-                                     "\nproperty float confidence\nproperty uint support\n"),
-                           HasSubstr(raw(-3.0) + raw(0.0F) + raw(0.0F) + raw(1.0F)),
-                           EndsWith(raw(2.0) + raw(0.0F) + raw(1.0F) + raw(0.0F) +
-                                    std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))))
+  EXPECT_THAT(
+      bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
+                             "\nproperty float confidence\nproperty uint support\n"
+                             "property float probability\n"),
+                   HasSubstr(raw(-3.0) + raw(0.0F) + raw(0.0F) + raw(1.0F)),
+                   EndsWith(raw(2.0) + raw(0.0F) + raw(1.0F) + raw(0.0F) +
+                            std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U) + raw(0.75F))))
       << "normals from each point to its first keyframe";
   std::ostringstream stream;
   EXPECT_THAT(messageOf([&] {
@@ -151,7 +154,7 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
   }
   const std::vector<CloudPoint> points = plainPoints(1000);
   std::vector<CloudPoint> with_sigma = points;
-  for (CloudPoint& point : with_sigma) point.sigma = 0.25F;
+  for (CloudPoint& point : with_sigma) point.sigma = point.probability = 0.25F;
   writePcd(folder() / "map.pcd", *mapCloudOf(with_sigma, 1e9));
   EXPECT_EQ(filesInFolder(), 1U) << "no temporary file stays";
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd a.pcd 0"), 0);
@@ -166,7 +169,8 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary v.pcd va.pcd 0"), 0);
   EXPECT_LT(readPointCloud(folder() / "va.pcd").points.size(), 200U);
   EXPECT_THAT(readBytes(folder() / "va.pcd"),
-              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"), HasSubstr(" 1 0.25\n")));
+              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma probability\n"),
+                    HasSubstr(" 1 0.25 0.25\n")));
   // pcl_convert_pcd_ascii_binary pads the compressed file to a whole page.
   std::string bytes = readBytes(folder() / "c.pcd");
   const std::size_t sizes = bytes.find("compressed\n") + 11;
@@ -197,7 +201,7 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
   writePcd(folder() / "map.pcd", *mapCloudOf(points, 0.01));
   expectAllDigits("map.pcd", 1e-4);
   EXPECT_THAT(readBytes(folder() / "map.pcd"),
-              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"),
+              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma probability\n"),
                     HasSubstr("\nVIEWPOINT 450000 5400000 0 1 0 0 0\n")));
   if (std::system("command -v pcl_convert_pcd_ascii_binary >/dev/null") != 0) {
     GTEST_SKIP() << "the package pcl-tools is not installed";

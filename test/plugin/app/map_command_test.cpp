@@ -78,6 +78,9 @@ TEST_F(MapCommand, TheMaximaOfTheSavedDsiAreTheConfidences) {
   EXPECT_EQ(report["points"], cv::countNonZero(depth));
   EXPECT_EQ(report["keyframes"], 1);
 
+  const cv::Mat probability = image("out/probability.tiff");
+  EXPECT_EQ(cv::countNonZero((probability > 0) != (depth > 0)), 0);
+
   const cv::Mat1f confidence = image("out/confidence.tiff");
   const std::string npy = contentOf("out/dsi.npy");
   EXPECT_THAT(npy.substr(0, 128), HasSubstr("'shape': (" + std::to_string(planes) + ", "));

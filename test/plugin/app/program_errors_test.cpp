@@ -144,7 +144,7 @@ TEST_F(Interrupted, AStoppedMapReplacesAnEarlierResultAndAKilledOneDoesNot) {
   EXPECT_GT(keyframes, 0U);
   EXPECT_EQ(posesIn("out").size(), keyframes);
   const auto files = filesIn("out");
-  EXPECT_EQ(files.size(), 7 + 4 * keyframes);
+  EXPECT_EQ(files.size(), 7 + 5 * keyframes);
 
   const std::string earlier = contentOf("out/map.pcd");
   EXPECT_EQ(interrupted(slow, writes, SIGKILL).status, -1);
@@ -152,7 +152,7 @@ TEST_F(Interrupted, AStoppedMapReplacesAnEarlierResultAndAKilledOneDoesNot) {
   EXPECT_EQ(contentOf("out/map.pcd"), earlier);
   EXPECT_EQ(reportIn("out"), report);
   ASSERT_EQ(run(map).status, 0);
-  EXPECT_EQ(filesIn("out").size(), 7 + 4 * whole) << "nothing of the killed run";
+  EXPECT_EQ(filesIn("out").size(), 7 + 5 * whole) << "nothing of the killed run";
 }
 
 TEST_F(Interrupted, TwoImportsOfOneNameWriteTheWholeResultOfOne) {

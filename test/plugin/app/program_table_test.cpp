@@ -101,11 +101,11 @@ std::set<std::string> filesOf(const std::string& text) {
   const std::map<std::string, std::vector<std::string>> results = {
       {"MAP",
        {"keyframes/*/confidence.png", "keyframes/*/confidence.tiff", "keyframes/*/depth.png",
-        "keyframes/*/depth.tiff", "map.html", "map.pcd", "map.png", "map.simplemap", "overview.png",
-        "report.json", "trajectory.txt"}},
+        "keyframes/*/depth.tiff", "keyframes/*/probability.tiff", "map.html", "map.pcd", "map.png",
+        "map.simplemap", "overview.png", "report.json", "trajectory.txt"}},
       {"KEYFRAME",
        {"confidence.png", "confidence.tiff", "depth.png", "depth.tiff", "points.pcd",
-        "report.json"}}};
+        "probability.tiff", "report.json"}}};
   std::set<std::string> files;
   std::istringstream names(text);
   for (std::string name; names >> name;) {

@@ -79,8 +79,11 @@ void expectGettersAgree(CEventFusionMapBuilder& builder) {
     // The simplemap's angles may round, so the cloud is compared at the exact pose.
     cloud.insert(number++, pointsInWorld(*keyframe.points, T_world_ref), T_world_ref);
   }
-  auto expected = pcl::make_shared<MapCloud>(*points);  // a simplemap cannot store sigma
-  for (MapPoint& point : *expected) point.sigma = MapPoint().sigma;
+  auto expected = pcl::make_shared<MapCloud>(*points);
+  for (MapPoint& point : *expected) {  // a simplemap cannot store them
+    point.sigma = MapPoint().sigma;
+    point.probability = MapPoint().probability;
+  }
   expectSameBits(cloud.points(), expected);
 
   const auto* const metric = builder.getCurrentlyBuiltMetricMap();

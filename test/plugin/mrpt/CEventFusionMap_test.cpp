@@ -39,7 +39,10 @@ StoredKeyframe randomKeyframe(unsigned seed, int count = 200) {
     const auto x = static_cast<float>(draw(-1, 1));
     const auto y = static_cast<float>(draw(-1, 1));
     const auto z = static_cast<float>(draw(0.5, 3));
-    points.push_back({{x, y, z}, static_cast<float>(draw(0.001, 1000))});
+    points.push_back({{x, y, z},
+                      static_cast<float>(draw(0.001, 1000)),
+                      static_cast<float>(draw(0.01, 0.1)),
+                      static_cast<float>(draw(0.5, 1))});
   }
   keyframe.points = std::make_shared<std::vector<ViewPoint>>(std::move(points));
   return keyframe;
@@ -221,7 +224,8 @@ TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
   expectSamePoints(*read, map);
 }
 
-/// Stores a map as earlier versions of this program did: without a consistency check and sigmas.
+/// Stores a map as earlier versions of this program did: without probabilities (2), sigmas (1) and
+/// a consistency check (0).
 Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
   Bytes content;
   auto out = mrpt::serialization::archiveFrom(content);
@@ -235,6 +239,9 @@ Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
     for (const double value : keyframe.T_world_ref.translation) out << value;
     for (const double value : keyframe.T_world_ref.rotation.coeffs()) out << value;
     out << *cloudOf(keyframe);
+    std::vector<float> sigmas;
+    for (const ViewPoint& point : *keyframe.points) sigmas.push_back(point.sigma);
+    if (version > 1) out << sigmas;
   }
   Bytes bytes = bytesOf(map);
   constexpr std::size_t kVersionAt = sizeof("efm::CEventFusionMap");  // after length and name
@@ -247,20 +254,30 @@ Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
 
 TEST(CEventFusionMap, EarlierVersionsAreReadLaterAndDamagedOnesAreErrors) {
   const CEventFusionMap map = mapOf(2);
-  for (const std::uint8_t version : {0, 1}) {
+  for (const std::uint8_t version : {0, 1, 2}) {
     const auto read = objectFrom<CEventFusionMap>(storedAs(version, map));
     ASSERT_TRUE(read) << int{version};
     const ConsistencyOptions& options = read->cloud().options().consistency;
     EXPECT_EQ(options.consistency, version == 0 ? Consistency::kNone : Consistency::kSupport);
     EXPECT_EQ(options.max_contradictions,
               version == 0 ? ConsistencyOptions().max_contradictions : 4);
+    const MapPoint point = read->cloud().points()->front();
+    EXPECT_EQ(std::isnan(point.sigma), version < 2) << int{version};
+    EXPECT_TRUE(std::isnan(point.probability)) << int{version};
     if (version == 0) {
-      expectSamePoints(*read, map);
+      CEventFusionMap without(map.cloud().options());
+      for (StoredKeyframe keyframe : map.keyframes()) {
+        auto points = std::make_shared<std::vector<ViewPoint>>(*keyframe.points);
+        for (ViewPoint& p : *points) p = {p.p_ref, p.confidence};
+        keyframe.points = points;
+        without.insertKeyframe(keyframe);
+      }
+      expectSamePoints(*read, without);
     }
     EXPECT_TRUE(isSame(read->keyframes()[1].T_world_ref, map.keyframes()[1].T_world_ref));
   }
-  EXPECT_THAT(messageOf([&] { objectFrom<CEventFusionMap>(storedAs(3, map)); }),
-              HasSubstr("an event fusion map of version 3: this program reads versions 0 to 2"));
+  EXPECT_THAT(messageOf([&] { objectFrom<CEventFusionMap>(storedAs(4, map)); }),
+              HasSubstr("an event fusion map of version 4: this program reads versions 0 to 3"));
   const Bytes bytes = bytesOf(map);
   for (const std::size_t kept : {bytes.size() / 3, bytes.size() / 2, bytes.size() - 20}) {
     const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept));

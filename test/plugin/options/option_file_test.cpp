@@ -124,6 +124,8 @@ TEST(OptionReader, AnErrorNamesTheLine) {
        "rig.ini:2: [keyframes] min_visible_share: is called min_visible_fraction now"},
       {"[depth]\nmin_excess = 1\n",
        "rig.ini:2: [depth] min_excess: is called min_local_contrast now"},
+      {"[depth]\nmin_quality = 0.1\n",
+       "rig.ini:2: [depth] min_quality: was replaced by min_probability (0 to below 1"},
   };
   for (const auto& row : cases) {
     EXPECT_THAT(errorOf(row.text), AllOf(StartsWith(row.begin), HasSubstr(row.part))) << row.text;
@@ -143,7 +145,7 @@ TEST(OptionReader, AnErrorSaysTheExpectedKindOfAValue) {
        "must be a whole number, or auto"},
       {"keyframes", "window_events", {"many"}, "must be a whole number"},
       {"dsi", "min_depth_m", {"1,5", "1.5m", "nan", "inf"}, "must be a number, or auto"},
-      {"depth", "min_quality", {"1,5", "1.5m", "nan", "inf"}, "must be a number"},
+      {"depth", "min_probability", {"1,5", "1.5m", "nan", "inf"}, "must be a number"},
       {"dsi", "spacing", {"cubic"}, "'cubic' is unknown: expected one of inverse, linear"},
       {"dsi", "fov_deg", {"wide"}, "must be a number, or auto"},
       {"dsi",

@@ -177,7 +177,10 @@ TEST_P(MapperInEitherMode, OwnDataMakeTheMapOfARecording) {
 }
 
 TEST(Mapper, OwnDataMayComeInAnyOrderOfSensors) {
-  const SyntheticRecording recording(0.8);
+  SyntheticRecording recording(0.8);
+  for (auto& events : recording.events) {  // `samplesOf` ends with the last pose, too
+    while (events.back().t_ns >= recording.poses.back().t_ns) events.pop_back();
+  }
   for (const bool is_chosen : {false, true}) {
     EventFusionOptions options = syntheticOptions();
     if (is_chosen) options.automatic = defaultOptions().automatic;

@@ -62,6 +62,7 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
 EventFusionOptions automaticOptions() {
   EventFusionOptions options = syntheticOptions();
   options.automatic = defaultOptions().automatic;
+  options.mapper.keyframe.extraction.min_probability = 0.6;
   return options;
 }
 

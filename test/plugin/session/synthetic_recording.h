@@ -123,6 +123,7 @@ inline EventFusionOptions syntheticOptions() {
   options.mapper.fill_last_window = false;  // as in live operation; tests compare it with playback
   options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
   options.mapper.keyframe.extraction.threshold_c = 60;  // single dots stand out strongly
+  options.mapper.keyframe.extraction.min_probability = 0;  // and they are no edges
   return options;
 }
 

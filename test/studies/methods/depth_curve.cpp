@@ -13,7 +13,7 @@
 namespace efm::studies {
 namespace {
 
-constexpr double kFewerCandidates = 0.1;  ///< Thresholds below it relax the local contrast, too.
+constexpr double kFewerCandidates = 0.9;  ///< Thresholds below it relax the local contrast, too.
 constexpr double kWrong = 0.1;            ///< Relative depth error of a wrong point.
 constexpr double kInlierPlanes = 5;       ///< Variances are judged for points within this distance.
 
@@ -40,7 +40,7 @@ PointQuality mix(const PointQuality& a, const PointQuality& b, double of_b) {
 
 std::vector<double> thresholdsOf(ExtractionMethod method) {
   if (method == ExtractionMethod::kPaper) return {30, 20, 14, 9, 7, 5, 3.5, 2.5, 1.5, 0.5};
-  return {0.9, 0.6, 0.4, 0.25, 0.16, 0.1, 0.06, 0.03, 0.012, 0.004};
+  return {0.999, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.7, 0.4, 0.1};
 }
 
 }  // namespace
@@ -51,7 +51,7 @@ DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double t
   } else {
     // More points need more candidates.
     extraction.min_local_contrast *= std::clamp(threshold / kFewerCandidates, 0.3, 1.0);
-    extraction.min_quality = threshold;
+    extraction.min_probability = threshold;
   }
   return extraction;
 }

@@ -57,7 +57,7 @@ class DepthJudge {
   double step_;                           // of inverse depth, 1/m
 };
 
-/// The extraction with another threshold: `threshold_c` of `kPaper`, `min_quality` of
+/// The extraction with another threshold: `threshold_c` of `kPaper`, `min_probability` of
 /// `kAggregated`.
 DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double threshold);
 

@@ -122,6 +122,7 @@ std::vector<Method> betterDepthMethods(const Method& paper) {
   Method both = aggregated;
   both.name = "split fusion and aggregation (default)";
   both.options.split = SplitFusionOptions();
+  both.options.sweep.fusion = FusionOptions();
   return {paper, subplane, split, aggregated, both};
 }
 
