@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/depth/depth_probability.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -10,14 +11,14 @@ namespace efm {
 
 template <std::size_t kInputs, std::size_t kHidden>
 float Network<kInputs, kHidden>::probabilityOf(const Inputs& x) const {
+  using Units = Eigen::Array<float, int{kHidden}, 1>;  // Eigen's tanh is that of a vector
   constexpr float kLimit = 5;
-  Hidden sums = b1;
+  Units sums = Units::Map(b1.data());
   for (std::size_t i = 0; i < kInputs; ++i) {
     const float z = std::clamp((x[i] - mean[i]) / sd[i], -kLimit, kLimit);
-    for (std::size_t j = 0; j < kHidden; ++j) sums[j] += z * w1[i][j];
+    sums += z * Units::Map(w1[i].data());
   }
-  float logit = b2;
-  for (std::size_t j = 0; j < kHidden; ++j) logit += w2[j] * std::tanh(sums[j]);
+  const float logit = b2 + (Units::Map(w2.data()) * sums.tanh()).sum();
   return 1 / (1 + std::exp(-logit));
 }
 
