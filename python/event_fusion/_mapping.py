@@ -553,7 +553,7 @@ class Candidates(NamedTuple):
     neighbours : numpy.ndarray
         Pixels beside them, and candidates without a depth of their own (``depth.neighbours``); 6 inputs.
     keyframe : Keyframe
-        The depth map of the window, as `Dsi.keyframe`.
+        The depth map of the window, with the depths of neighbours.
     """
 
     candidates: Array
