@@ -57,7 +57,7 @@ std::vector<double> thresholdsOf(ExtractionMethod method) {
   if (method == ExtractionMethod::kPaper) {
     for (int c = 20; c >= 0; --c) thresholds.push_back(c);
   } else {
-    for (double quality = 1; quality > 0.002; quality *= 0.97) thresholds.push_back(quality);
+    for (double wrong = 0.001; wrong < 0.99; wrong *= 1.06) thresholds.push_back(1 - wrong);
   }
   return thresholds;
 }
@@ -194,7 +194,8 @@ void judgeSlider(const std::vector<SliderResult>& results, const SliderTruth& tr
                 horizontal <= 0.45, formatNumber(horizontal, 2));
   section.trend("The fraction of covered vertical edges does not fall",
                 ours.vertical_covered >= paper.vertical_covered,
-                percent(paper.vertical_covered) + " to " + percent(ours.vertical_covered) + " %");
+                percent(paper.vertical_covered) + " to " + percent(ours.vertical_covered) + " %",
+                "Probable depths have many neighbours that agree: short and faint edges have few.");
 }
 
 double shareWithTruth(const cv::Mat1b& lines, const cv::Mat1f& truth_m) {
