@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -302,7 +303,12 @@ void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& ima
 void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) {
   writeImage(folder / "depth.tiff", map.depth);
   writeImage(folder / "confidence.tiff", map.confidence);
-  writeImage(folder / "probability.tiff", map.probability);
+  cv::Mat1f probability = map.probability;
+  if (probability.empty()) {  // of no pixel known
+    probability = cv::Mat1f::zeros(map.depth.size());
+    probability.setTo(std::numeric_limits<float>::quiet_NaN(), map.depth > 0);
+  }
+  writeImage(folder / "probability.tiff", probability);
   const bool plain = style_ == PictureStyle::kPlain;
   writeImage(folder / "depth.png", plain ? depthPicture(map.depth, limits_, Palette::kBlueToRed)
                                          : depthFigure(map, limits_));

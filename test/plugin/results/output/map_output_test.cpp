@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <cstring>
@@ -55,6 +56,10 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
       cv::imread((keyframe / "confidence.tiff").string(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(confidence.type(), CV_32F);
   EXPECT_EQ(confidence.at<float>(1, 2), 17.5F);
+  const cv::Mat probability =
+      cv::imread((keyframe / "probability.tiff").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_TRUE(std::isnan(probability.at<float>(1, 2))) << "not known";
+  EXPECT_EQ(probability.at<float>(0, 0), 0.0F);
   const auto sizeOf = [&](const char* name) {
     return cv::imread((keyframe / name).string()).size();
   };

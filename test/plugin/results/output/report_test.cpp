@@ -125,7 +125,7 @@ TEST(Report, OptionsHaveTheKeysOfFilesAndTheirTypes) {
   EXPECT_EQ(options["dsi"]["min_depth_m"], 0.5);
   EXPECT_EQ(options["depth"]["subplane"], true);
   EXPECT_EQ(options["depth"]["max_confidence"], "keyframe");
-  EXPECT_EQ(options["fusion"]["across_cameras"], "harmonic");
+  EXPECT_EQ(options["fusion"]["across_cameras"], "pairs");
   EXPECT_EQ(options["performance"]["threads"], 3);
 }
 
