@@ -252,7 +252,6 @@ void defineJobs(py::module_& module) {
       .def_property_readonly("tracker_trajectory",
                              [](const MapResult& r) { return posesOf(r.map->tracker_trajectory); })
       .def_property_readonly("report", [](const MapResult& r) { return reportJson(r.report); })
-      .def_property_readonly("doubts", [](const MapResult& r) { return r.report.doubts; })
       .def(
           "save", [](const MapResult& r, const Path& file) { savePoints(*r.map, file); }, releases)
       .def("reject_error", &MapResult::rejectError);

@@ -170,8 +170,9 @@ def row(out, name):
         cells["status"] = "mapped"
         warnings = {warning["name"] for warning in report["warnings"]} if report else set()
         reasons = ["warnings: " + ", ".join(sorted(warnings))] if warnings else []
-        if report and report.get("doubtful"):
-            reasons.insert(0, "doubtful: " + ", ".join(report["doubtful"]))
+        quality = report and report.get("quality")
+        if quality and quality["word"] in ("doubtful", "wrong"):
+            reasons.insert(0, f"{quality['word']}: " + ", ".join(quality["reasons"]))
         cells["reason"] = "; ".join(reasons) or "-"
     elif status == 130:
         cells.update(status="stopped", reason="stopped as requested")

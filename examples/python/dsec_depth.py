@@ -23,4 +23,4 @@ for keyframe in made:
     axes = plot.depth(keyframe)
     axes.figure.savefig(out / f"{keyframe.t}.png", bbox_inches="tight")
     plt.close(axes.figure)
-print(made.report["keyframes"], "depth maps,", len(made.points), "points;", *made.doubts)
+print(made.report["keyframes"], "depth maps,", len(made.points), "points;", made.quality["word"], *made.quality["reasons"])

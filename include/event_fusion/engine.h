@@ -198,7 +198,7 @@ struct Report {
   std::uint64_t keyframes = 0;
   std::uint64_t points = 0;
   std::vector<Warning> warnings;
-  std::vector<std::string> doubts;  ///< Reasons why the map has little evidence; usually none.
+  MapQuality quality;
   std::string json;                 ///< The content of report.json: counts, times, options, …
 };
 

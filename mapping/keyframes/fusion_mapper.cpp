@@ -227,6 +227,11 @@ void FusionMapper::setPlanes(const DepthPlanesOptions& planes) {
   if (mapper_) mapper_->setPlanes(planes);
 }
 
+void FusionMapper::setMotion(const MotionCorrectionOptions& motion) {
+  options_.keyframe.motion = motion;
+  if (mapper_) mapper_->setMotion(motion);
+}
+
 /// Returns the current window if it is complete: all of its events and poses are here.
 std::optional<Window> FusionMapper::completeWindow() {
   findStart();

@@ -136,6 +136,8 @@ class FusionMapper : private RecordingProgress {
   void configure(const KeyframePolicyOptions& policy, const DepthPlanesOptions& planes);
   /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);
+  /// Sets the correction of the motion of the next keyframes.
+  void setMotion(const MotionCorrectionOptions& motion);
 
   std::uint64_t correctedKeyframes() const { return counts_.motion.corrected; }
   /// Returns the counts, complete once `finish` was called and `next` returned std::nullopt.

@@ -140,6 +140,8 @@ class KeyframeMapper {
 
   /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);
+  /// Sets the correction of the motion of the next keyframes.
+  void setMotion(const MotionCorrectionOptions& motion) { options_.motion = motion; }
 
   /// Returns T_world_ref of the reference view for a pose of the rig.
   Rigid3 referencePose(const Rigid3& T_world_rig) const;

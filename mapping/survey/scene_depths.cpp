@@ -105,25 +105,29 @@ std::pair<std::int64_t, std::int64_t> coveredBy(const WindowSample& sample,
 
 }  // namespace
 
+namespace {
+
+/// @param length_ns length of a piece for the time that a sample covers, and the number of its
+/// pieces.
+template <typename Length>
 std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
-                                  const TrajectoryOptions& options) {
+                                  const TrajectoryOptions& options, std::uint32_t events,
+                                  const Length& lengthOf) {
   std::vector<SamplePiece> pieces;
   const std::size_t of_each = (kPieces + samples.size() - 1) / samples.size();
   for (const WindowSample& sample : samples) {
     const Trajectory trajectory = withoutJitter(sample.trajectory, options);
     const auto [begin_ns, end_ns] = coveredBy(sample, trajectory);
     const std::int64_t whole_ns = end_ns - begin_ns;
-    const std::int64_t length_ns =
-        std::min({whole_ns, durationFromSeconds(kPieceS),
-                  std::max(whole_ns / 2, durationFromSeconds(kShortPieceS))});
+    const std::int64_t length_ns = lengthOf(whole_ns, static_cast<std::int64_t>(of_each));
     if (length_ns <= 0) continue;
     for (std::size_t i = 0; i < of_each; ++i) {
       const auto t0_ns = begin_ns + (whole_ns - length_ns) * static_cast<std::int64_t>(2 * i + 1) /
                                         static_cast<std::int64_t>(2 * of_each);
       const Window window{t0_ns, t0_ns + length_ns, t0_ns + length_ns / 2};
       SamplePiece& piece = pieces.emplace_back(SamplePiece{window, {}, trajectory});
-      for (const EventSpan& events : eventsWithin(sample, window)) {
-        piece.events.push_back(chosenEvenly(events, kMaxPieceEvents));
+      for (const EventSpan& of_camera : eventsWithin(sample, window)) {
+        piece.events.push_back(chosenEvenly(of_camera, events));
       }
     }
   }
@@ -135,6 +139,23 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
     if (i < count) chosen.push_back(std::move(pieces[i * pieces.size() / count]));
   }
   return chosen;
+}
+
+}  // namespace
+
+std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
+                                  const TrajectoryOptions& options) {
+  return piecesOf(samples, options, kMaxPieceEvents, [](std::int64_t whole_ns, std::int64_t) {
+    return std::min({whole_ns, durationFromSeconds(kPieceS),
+                     std::max(whole_ns / 2, durationFromSeconds(kShortPieceS))});
+  });
+}
+
+std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
+                                  const TrajectoryOptions& options, const PieceSize& size) {
+  return piecesOf(samples, options, size.events, [&](std::int64_t whole_ns, std::int64_t count) {
+    return std::min(durationFromSeconds(size.max_s), whole_ns / count);
+  });
 }
 
 namespace {

@@ -72,6 +72,14 @@ inline constexpr std::uint32_t kMaxPieceEvents = 20'000;
 std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
                                   const TrajectoryOptions& options);
 
+/// The size of pieces that do not overlap.
+struct PieceSize {
+  double max_s = 0.2;
+  std::uint32_t events = kMaxPieceEvents;  ///< Maximum number of each camera.
+};
+std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
+                                  const TrajectoryOptions& options, const PieceSize& size);
+
 /// Measures the motion of the cameras that the options select.
 inline std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
                                           const FusionMapperOptions& options) {

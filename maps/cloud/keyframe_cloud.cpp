@@ -130,6 +130,11 @@ void RefinedCloud::freeze(std::size_t below) {
   for (; frozen_ < below; ++frozen_) kept_[frozen_] = {};
 }
 
+void RefinedCloud::removePoints(std::size_t keyframe) {
+  cloud_.replace(fixed_ + keyframe, {}, std::nullopt);
+  if (keyframe < kept_.size()) kept_[keyframe].points.clear();
+}
+
 void RefinedCloud::removeNewest() {
   if (T_world_ref_.empty()) return;
   cloud_.remove(fixed_ + T_world_ref_.size() - 1);

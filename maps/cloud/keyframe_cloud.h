@@ -55,6 +55,10 @@ class RefinedCloud {
   /// Removes the keyframe that was inserted last, if there is one.
   void removeNewest();
 
+  /// Removes the points of a keyframe that is one of the last `GlobalCloud::kMaxNumberDifference`.
+  /// It keeps its number and pose, and checks no other keyframe.
+  void removePoints(std::size_t keyframe);
+
   /// Requests new poses for keyframes, by their numbers. `applyPending` moves them. A request for a
   /// keyframe that cannot move any more is dropped: the keyframe keeps its last pose.
   /// @throws std::invalid_argument if a keyframe was not inserted, or keyframes are not movable.

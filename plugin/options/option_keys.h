@@ -73,6 +73,7 @@ void visitOptions(Options& options, const Use& use) {
 
   visit.section = "map";
   visit(options.cloud);
+  visit("min_keyframe_quality", options.min_keyframe_quality, Allowed::from(0, 1, "0 to 1"));
 
   visit.section = "filter";
   visit(mapper.filter);
@@ -85,6 +86,9 @@ void visitOptions(Options& options, const Use& use) {
 
   visit.section = "live";
   visit(options.live);
+
+  visit.section = "checks";
+  visit("enabled", options.checks);
 
   visit.section = "output";
   visit("camera_maps", keyframe.camera_maps);

@@ -286,20 +286,22 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
     options.cloud.voxel_size_m = choice.voxel_size_m.value_or(options.cloud.voxel_size_m);
     options.automatic = {};
     if (!choice.is_proven) {
-      report.doubts.push_back(choice.found_scene
+      first.quality.doubts.push_back(choice.found_scene
                                   ? "the parallax is too small to tell how far the scene is away"
                                   : "no scene was found to choose depth limits from");
     }
   }
-  PoseVerdict verdict = survey.judgePoses(options.mapper);
+  PoseVerdict verdict = options.checks ? survey.judgePoses(options.mapper) : PoseVerdict();
+  verdict.applyTo(options.mapper);
   append(report.warnings, std::move(verdict.warnings));
   warnOfNew();
-  append(verdict.notes, held->read().counts().notes);
+  verdict.notes = held->read().counts().notes;  // the quality says what could not be checked
   for (const Warning& note : verdict.notes) {
     if (job.note) job.note(note.name + ": " + note.text);
   }
   report.notes = std::move(verdict.notes);
-  append(report.doubts, std::move(verdict.doubts));
+  append(verdict.quality.doubts, std::move(first.quality.doubts));
+  first.quality = std::move(verdict.quality);
   if (!held->isWhole()) return nullptr;
   return held;
 }
@@ -362,10 +364,6 @@ void MapSteps::describe(MappingRun& run, bool stopped) {
 
 void MapSteps::judgePoints(const MapCloud& points) {
   warnOfNoPoints(report);
-  constexpr std::uint64_t kFewPoints = 200;  // fewer are little evidence, even if each is sure
-  if (report.points < kFewPoints && report.counts.keyframes > 0) {
-    report.doubts.push_back(fmt::format("the map has {} points", report.points));
-  }
   if (auto warning = farPointsWarning(points, report.options.cloud.voxel_size_m)) {
     report.warnings.push_back(std::move(*warning));
   }
@@ -601,7 +599,7 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
   MapReport& report = result.report;
   std::string json = reportJson(report);  // as the file, with the program's options
   return {report.counts.keyframes, report.points,
-          hostTexts(std::move(report.warnings), HostFace::kRecording), std::move(report.doubts),
+          hostTexts(std::move(report.warnings), HostFace::kRecording), std::move(report.quality),
           std::move(json)};
 }
 

@@ -32,6 +32,7 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
     made_.push_back(keyframe);
   };
   mapper_ = std::make_shared<Mapper>(options, std::move(callbacks));
+  mapper_->core().setFacts(first_.quality);
 }
 
 /// Runs a step. @return false if it throws. The run's error is the first exception.
@@ -226,7 +227,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   report.times.real.read = reading_.real.read;
   report.times.cpu.read = reading_.cpu.read;
   report.pixels = depths_.pixels();
-  append(report.doubts, depths_.doubts());
+  report.quality = status.quality;
   if (status.events) {
     report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }
@@ -234,6 +235,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   Findings findings{first_.statistics, read};
   findings.use(planes, first_.chosen);
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
+  findings.checks = options_.checks;
   findings.voxel_size_m = report.options.cloud.voxel_size_m;
   if (stopped && status.events) findings.until_ns = status.events->last_ns;
   findings.session = &status;

@@ -26,6 +26,7 @@ namespace efm {
 struct FirstPass {
   std::vector<ChosenOption> chosen;  ///< The options that were automatic.
   RecordingStatistics statistics;    ///< Statistics of the events; the mapping adds the poses.
+  QualityFacts quality;
 };
 
 /// Feeds a recording to a mapper sample by sample, with progress on stderr, and keeps the data for

@@ -104,9 +104,12 @@ bool MappingSession::chooseFromFirstLook() {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
                                       finished_ ? survey.duration_s : std::nullopt, chosen);
-  PoseVerdict verdict = survey.judgePoses(chosen);
+  PoseVerdict verdict = options_.checks ? survey.judgePoses(chosen) : PoseVerdict();
+  verdict.applyTo(chosen);
+  mapper_.setMotion(chosen.keyframe.motion);
   status_.pose_warnings = std::move(verdict.warnings);
   status_.pose_notes = std::move(verdict.notes);
+  facts_ = std::move(verdict.quality);
   if (finished_) {  // no more data: following limits would be no better
     use(std::move(choice), chosen);
     depth_follower_.reset();

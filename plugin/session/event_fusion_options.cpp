@@ -24,6 +24,8 @@ void EventFusionOptions::validate() const {
   cloud.validate();
   refinement.refiner.validate();
   live.validate();
+  requireOption(min_keyframe_quality >= 0 && min_keyframe_quality <= 1, "min_keyframe_quality",
+                min_keyframe_quality, "0 to 1");
 }
 
 std::size_t EventFusionOptions::movableKeyframes() const {

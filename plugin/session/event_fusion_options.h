@@ -99,6 +99,9 @@ struct EventFusionOptions {
   MapRefinementOptions refinement;
   RigOptions rig;
   LiveOptions live;
+  bool checks = true;  ///< Judge poses, cameras and the map; data that are not used are told always.
+  /// Keyframes whose predicted fraction of right depths is lower are left out of the map. 0 to 1.
+  double min_keyframe_quality = 0;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.
 
   /// Returns the number of newest keyframes that the refinement may move.

@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
+#include <initializer_list>
 #include <stdexcept>
 #include <utility>
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/survey/camera_check.h"
 #include "mapping/survey/depth_agreement.h"
 #include "plugin/session/health_checks.h"
 
@@ -39,21 +42,76 @@ EventPacket subsampled(const EventPacket& packet) {
   return chosen;
 }
 
-/// Judges the poses. A known mistake explains more than different depths do.
+/// Takes the comparison of two cameras into a verdict.
+void use(const CameraComparison& found, const Rig& rig, PoseVerdict& verdict) {
+  // Of the shift of the maps, pixels; measured with simulated recordings.
+  constexpr double kWrongPerPx = 0.12;
+  constexpr double kMostWrong = 0.7;
+  QualityFacts& quality = verdict.quality;
+  quality.sure_depth_m = std::min(quality.sure_depth_m, found.sure_depth_m);
+  if (found.fault == CameraFault::kUnknown) {
+    quality.doubts.push_back(fmt::format(
+        "the maps of cameras {} and {} alone differ, and the poses blur the events too much to "
+        "tell whether the calibration between the cameras is wrong",
+        found.other, found.camera));
+  }
+  auto warning = cameraWarning(found, rig);
+  if (!warning) return;
+  quality.wrong_by_cameras =
+      std::max(quality.wrong_by_cameras, std::min(kMostWrong, kWrongPerPx * found.shift_px));
+  verdict.warnings.push_back(std::move(*warning));
+  verdict.keep_motion = true;
+}
+
+/// Returns whether a comparison of the cameras explains the events better than a mistake of a clock.
+/// The comparison sees offsets of some milliseconds, which the mistake's search cannot.
+bool explainsMore(const std::vector<CameraComparison>& compared, const PoseFinding& finding) {
+  constexpr double kSeenS = 0.015;  // larger offsets may hide from the comparison
+  const bool is_clock = finding.mistake == PoseMistake::kCameraClock;
+  if (!is_clock && finding.mistake != PoseMistake::kTimeShift) return false;
+  return std::any_of(compared.begin(), compared.end(), [&](const CameraComparison& found) {
+    const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
+    return is_named || (is_clock && found.camera == static_cast<int>(*finding.camera) &&
+                        std::abs(finding.shift_s) < kSeenS);
+  });
+}
+
+/// Judges the poses and the cameras. A known mistake explains more than different depths do.
 void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
            PoseVerdict& verdict) {
   const PoseJudgement judgement = checkPoses(survey.rig, survey.samples, options);
-  const auto& finding = judgement.finding;
-  std::optional<Warning> warning;
-  if (!finding || finding->mistake == PoseMistake::kUnknown) {
-    const auto agreement = depthAgreement(survey.rig, survey.samples, options);
-    if (agreement) warning = agreementWarning(*agreement);
-    if (warning && !judgement.unchecked.empty()) warning->text += "; but " + judgement.unchecked;
+  const PoseFinding* finding = judgement.finding ? &*judgement.finding : nullptr;
+  const auto isAny = [&](std::initializer_list<PoseMistake> mistakes) {
+    return std::count(mistakes.begin(), mistakes.end(), finding->mistake) > 0;
+  };
+  std::vector<CameraComparison> compared;
+  if (finding == nullptr ||
+      isAny({PoseMistake::kUnknown, PoseMistake::kTimeShift, PoseMistake::kCameraClock})) {
+    compared = compareCameras(survey.rig, survey.samples, options);
   }
-  if (!warning && finding) warning = poseWarning(*finding, survey.rig);
-  if (warning) {
-    verdict.warnings.push_back(*warning);
-  } else if (!judgement.unchecked.empty()) {
+  if (finding != nullptr && explainsMore(compared, *finding)) finding = nullptr;
+  const bool is_known = finding != nullptr && !isAny({PoseMistake::kUnknown});
+  QualityFacts& quality = verdict.quality;
+  quality.unchecked = judgement.unchecked;
+  for (const CameraComparison& found : compared) {
+    if (!is_known) use(found, survey.rig, verdict);
+  }
+  std::vector<Warning> warnings;
+  if (is_known) warnings.push_back(poseWarning(*finding, survey.rig));
+  if (!is_known && !verdict.keep_motion) {
+    const auto agreement = depthAgreement(survey.rig, survey.samples, options);
+    if (agreement) {
+      quality.motion_agreement = agreement->agreeing;
+      if (auto warning = agreementWarning(*agreement)) {
+        if (!judgement.unchecked.empty()) warning->text += "; but " + judgement.unchecked;
+        warnings.push_back(std::move(*warning));
+      }
+    }
+    if (warnings.empty() && finding != nullptr) warnings.push_back(poseWarning(*finding, survey.rig));
+  }
+  if (!warnings.empty()) quality.mistake = warnings.front().name;
+  append(verdict.warnings, std::move(warnings));
+  if (verdict.warnings.empty() && !judgement.unchecked.empty()) {
     verdict.notes.push_back({"poses-unchecked", judgement.unchecked});
   }
 }
@@ -82,13 +140,18 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
     if (!sensitivity) return verdict;
     if (const auto warning = sensitivityWarning(*sensitivity)) verdict.warnings.push_back(*warning);
     if (sensitivity->per_10_ms > kMaxChange) {
-      verdict.doubts.push_back(
+      verdict.quality.doubts.push_back(
           fmt::format("a clock of the poses that is off by 10 ms changes the depths by {:.2g} %",
                       100 * sensitivity->per_10_ms));
     }
   } catch (const std::invalid_argument&) {
   }
   return verdict;
+}
+
+void PoseVerdict::applyTo(FusionMapperOptions& options) const {
+  MotionCorrectionUse& use = options.keyframe.motion.correct_motion;
+  if (keep_motion && use == MotionCorrectionUse::kAuto) use = MotionCorrectionUse::kNever;
 }
 
 double eventRate(const WindowData& data) {

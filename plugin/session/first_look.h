@@ -10,6 +10,7 @@
 #include "mapping/base/text.h"
 #include "mapping/survey/scene_depths.h"
 #include "plugin/session/event_fusion_options.h"
+#include "plugin/session/map_quality.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/rig_assembly.h"
 #include "plugin/session/sample.h"
@@ -20,8 +21,14 @@ namespace efm {
 /// Result of a first look at the poses.
 struct PoseVerdict {
   std::vector<Warning> warnings;
-  std::vector<Warning> notes;       ///< What could not be checked.
-  std::vector<std::string> doubts;  ///< Reasons why a map rests on little evidence.
+  std::vector<Warning> notes;  ///< What could not be checked.
+  QualityFacts quality;
+  /// True if the calibration between cameras is wrong. A correction of the motion would then hide
+  /// it, and make the map worse.
+  bool keep_motion = false;
+
+  /// Switches the automatic correction of the motion off, if the motion is to be kept.
+  void applyTo(FusionMapperOptions& options) const;
 };
 
 /// Returns the events per second of all cameras together.

@@ -19,6 +19,7 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
+#include "mapping/survey/camera_check.h"
 #include "mapping/survey/depth_agreement.h"
 #include "mapping/survey/option_choice.h"
 #include "mapping/survey/pose_check.h"
@@ -62,19 +63,11 @@ class DepthStatistics {
   /// check.
   std::vector<Warning> warnings(std::optional<double> voxel_size_m) const;
   const PixelCounts& pixels() const { return pixels_; }
-  /// Returns the reasons why the depths rest on little evidence; empty if there are none.
-  std::vector<std::string> doubts() const;
 
  private:
-  void compareWithLast(const KeyframeDepthMap& keyframe);
-
   DepthPlanesOptions planes_;
   std::vector<ChosenOption> chosen_;
   PixelCounts pixels_;
-  KeyframeDepthMap last_;              // its depths, view and pose
-  std::uint64_t shared_ = 0;           // points that two consecutive keyframes have
-  std::uint64_t agreeing_ = 0;         // shared points with the same depth
-  std::vector<double> parallaxes_px_;  // of each keyframe, at its median depth
   PixelSizes sizes_;
   std::uint64_t nearest_ = 0;   // depths near the nearest plane
   std::uint64_t farthest_ = 0;  // depths near the farthest plane
@@ -95,6 +88,7 @@ struct Findings {
   const DepthStatistics* depths = nullptr;
   const PixelSizes* pixels = nullptr;  ///< If `depths` are not known.
   double voxel_size_m = 0.01;          ///< Of the map.
+  bool checks = true;                  ///< False: only missing and unused data are told.
 
   /// Takes the depth limits of a map.
   void use(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);
@@ -165,6 +159,14 @@ void dropExplainedBlur(std::vector<Warning>& warnings);
 /// Returns the warning about wrong poses, with the option or file that fixes them.
 /// @param rig with which the mistake was found.
 Warning poseWarning(const PoseFinding& finding, const Rig& rig);
+
+/// Returns the offsets `rig.time_offsets_s` with which a clock is right: one value per camera.
+/// @param finding the shift, of all cameras or of one.
+std::string offsetsText(const Rig& rig, const PoseFinding& finding);
+
+/// Returns the warning `extrinsics` or `camera-clocks` about two cameras, with the calibration with
+/// which they fit. @return std::nullopt if nothing is wrong, or if it is not known what.
+std::optional<Warning> cameraWarning(const CameraComparison& found, const Rig& rig);
 
 /// Warns if the depths of the rig and those of its motion differ: `scale` or `depths-disagree`.
 /// @return std::nullopt if they agree.

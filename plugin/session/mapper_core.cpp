@@ -51,6 +51,7 @@ std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapper
 MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                        const std::vector<StoredKeyframe>& earlier)
     : options_(options.live),
+      checks_(options.checks),
       callbacks_(std::move(callbacks)),
       setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
       statistics_(statisticsOptions(withSetup(options, setup_))),
@@ -155,6 +156,7 @@ std::vector<Warning> MapperCore::warnings() {
   Findings findings{statistics, {}};
   findings.use(options.keyframe.planes, state.chosen);
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
+  findings.checks = checks_;
   findings.session = &state;
   findings.options = &options;
   findings.voxel_size_m = cloudOptions().voxel_size_m;
@@ -460,6 +462,11 @@ std::shared_ptr<MapSnapshot> MapperCore::makeSnapshot(bool with_points) {
     trajectory[i].T_world_rig = T_world_ref[i - earlier];
     if (i >= forgotten) keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
   }
+  for (const std::size_t left_out : session_.leftOut()) {
+    if (earlier + left_out < forgotten) continue;
+    keyframes[earlier + left_out - forgotten].points =
+        std::make_shared<const std::vector<ViewPoint>>();
+  }
   auto map = std::make_shared<MapSnapshot>(map_so_far_);
   if (with_points) map->points = session_.cloud().points();
   return map;
@@ -588,6 +595,11 @@ std::pair<cv::Mat1f, DepthPlanesOptions> MapperCore::newestDepth() const {
 void MapperCore::setSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
+}
+
+void MapperCore::setFacts(QualityFacts facts) {
+  const std::lock_guard<TurnMutex> lock(session_mutex_);
+  session_.setFacts(std::move(facts));
 }
 
 void MapperCore::setClock(ProcessorClock clock) {

@@ -91,6 +91,8 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
   /// The current keyframe may still use the former sink.
   void setSink(DsiSink* sink);
+  /// Tells what a first look of the host found.
+  void setFacts(QualityFacts facts);
   /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
   /// processor time of the process.
   void setClock(ProcessorClock clock);
@@ -135,6 +137,7 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   void warnOfLosses();
 
   const LiveOptions options_;
+  const bool checks_;
   const Callbacks callbacks_;
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample

@@ -372,6 +372,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &timer);
   if (!keyframe) limitWaits();
+  if (!keyframe && finished_) leaveOutBad(quality_.keyframes());
   if (keyframe) {
     newest_planes_ = used;
     try {
@@ -397,6 +398,14 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
 /// and refinement number keyframes alike: after an error neither has the keyframe.
 void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& store) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
+  if (quality_.keyframes() > 0) leaveOutBad(quality_.keyframes() - 1);
+  QualityStatistics judged = quality_;
+  MapQuality quality;
+  if (options_.checks) {
+    judged.add(keyframe, facts_);
+    quality = judged.quality(facts_, options_.mapper.keyframe.planes,
+                             selectedCameras(mapper_.rig(), options_.mapper.cameras).size());
+  }
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
   T_odom_ref_.push_back(T_odom_ref);
   try {
@@ -415,6 +424,8 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
     T_odom_ref_.pop_back();
     throw;
   }
+  std::swap(quality_, judged);
+  std::swap(status_.quality, quality);
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
@@ -426,6 +437,16 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
     moveKeyframes(kVoxelFraction * options_.cloud.voxel_size_m);
   } catch (...) {
     refinement_->fail(std::current_exception());
+  }
+}
+
+/// Leaves the keyframes below `end` out of the map whose quality is too low. The quality of a
+/// keyframe is known when the next one is made.
+void MappingSession::leaveOutBad(std::size_t end) {
+  for (; num_judged_ < end; ++num_judged_) {
+    if (quality_.rightShareOf(num_judged_) >= options_.min_keyframe_quality) continue;
+    cloud_.removePoints(num_judged_);
+    left_out_.insert(num_judged_);
   }
 }
 
@@ -454,6 +475,7 @@ SessionStatus MappingSession::status() const {
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();
   status.silent_keyframes.resize(status.rig.cameras.size());
+  status.quality.left_out = left_out_.size();
   status.recalibrated_cameras = rig_.recalibratedCameras();
   if (refinement_) {
     status.refinement = refinement_->state();

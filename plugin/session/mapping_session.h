@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
@@ -15,6 +16,7 @@
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/first_look.h"
 #include "plugin/session/live_guard.h"
+#include "plugin/session/map_quality.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/rig_assembly.h"
@@ -87,9 +89,14 @@ class MappingSession {
   /// @return true if a window was dropped; false if the error did not belong to a window.
   bool dropFailedWindow();
 
+  /// Tells what was found about the recording before, if another first look was taken.
+  void setFacts(QualityFacts facts) { facts_ = std::move(facts); }
+
   /// Moves all keyframes in the cloud to their refined poses.
   void applyPending();
 
+  /// Returns the keyframes without points in the cloud: `[map] min_keyframe_quality`.
+  const std::set<std::size_t>& leftOut() const { return left_out_; }
   const GlobalCloud& cloud() const { return cloud_.cloud(); }
   /// Return the poses of this session's keyframes, in order: in the cloud, and by the tracker.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
@@ -151,6 +158,7 @@ class MappingSession {
   void lookAgain(const Window& window);
 
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
+  void leaveOutBad(std::size_t end);
   void moveKeyframes(double tolerance_m);
 
   AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
@@ -171,6 +179,10 @@ class MappingSession {
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // set if poses are refined
   std::vector<Rigid3> T_odom_ref_;
+  QualityFacts facts_;
+  QualityStatistics quality_;
+  std::size_t num_judged_ = 0;  // keyframes that are left out, or not
+  std::set<std::size_t> left_out_;
   // Stated noise of the poses of each source, by the times of the poses.
   std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
   bool finished_ = false;

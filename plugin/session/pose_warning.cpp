@@ -10,6 +10,17 @@
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
+
+std::string offsetsText(const Rig& rig, const PoseFinding& finding) {
+  std::string text;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const double shift_s = finding.camera.value_or(c) == c ? finding.shift_s : 0;
+    const double offset_s = secondsBetween(0, rig.cameras[c].time_offset_ns) + shift_s;
+    text += (text.empty() ? "" : ",") + fmt::format("{:.3f}", offset_s);
+  }
+  return text;
+}
+
 namespace {
 
 constexpr NamedChoice<PoseMistake> kNames[] = {{PoseMistake::kInverted, "poses-inverted"},
@@ -44,17 +55,6 @@ std::string matrixText(const Eigen::Matrix3d& R_body_rig) {
                         R_body_rig(row, 1) + 0.0, R_body_rig(row, 2) + 0.0);
   }
   return text + "[0, 0, 0, 1]]";
-}
-
-/// Returns one value per camera. @param finding the shift, of all cameras or of one.
-std::string offsetsText(const Rig& rig, const PoseFinding& finding) {
-  std::string text;
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const double shift_s = finding.camera.value_or(c) == c ? finding.shift_s : 0;
-    const double offset_s = secondsBetween(0, rig.cameras[c].time_offset_ns) + shift_s;
-    text += (text.empty() ? "" : ",") + fmt::format("{:.3f}", offset_s);
-  }
-  return text;
 }
 
 std::string mirrorText(const PixelChange& pixels) {
@@ -186,8 +186,9 @@ std::optional<Warning> agreementWarning(const DepthAgreement& agreement) {
         fmt::format(
             "the depths from the cameras of the rig and those from the motion of one camera "
             "agree within 15 % in {:.0f} % of the pixels: expected most of them; the "
-            "calibration (focal length, lens, pose of the cameras to each other) or the "
-            "poses are of another recording or another order (--calibration, --poses)",
+            "calibration (focal length, lens, pose of the cameras to each other, their clocks) "
+            "or the poses are wrong or of another recording, or the tracker has errors within "
+            "the windows (--calibration, --poses)",
             100 * agreement.agreeing)};
   }
   if (agreement.scale < kMaxScale && kMaxScale * agreement.scale > 1) return std::nullopt;

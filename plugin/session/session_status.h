@@ -17,6 +17,7 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/keyframes/mapper_counts.h"
 #include "maps/refinement/refinement_state.h"
+#include "plugin/session/map_quality.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {
@@ -159,6 +160,7 @@ struct SessionStatus {
   /// Playback with automatic options: the poses do not explain the events of the first look.
   std::vector<Warning> pose_warnings;
   std::vector<Warning> pose_notes;            ///< What the first look could not check.
+  MapQuality quality;                         ///< How good the map so far is.
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
   std::optional<LiveStatus> live{};           ///< Set in live operation.
 };

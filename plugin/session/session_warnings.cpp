@@ -243,8 +243,9 @@ void checkSession(const Findings& findings, Warnings& warnings) {
   addSilence(status, findings.options->keyframe.exclude_silent, warnings);
   addUnusedPoses(status, warnings);
   addKeyframes(status, warnings);
-  if (const auto warning = blurWarning(status, *findings.options)) warnings.push_back(*warning);
   addLosses(status, warnings);
+  if (!findings.checks) return;
+  if (const auto warning = blurWarning(status, *findings.options)) warnings.push_back(*warning);
   if (status.scene_unknown && status.events && status.poses) {
     warnings.push_back(noSceneWarning());
   }
@@ -281,7 +282,8 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
         fmt::format("the poses blur the events by {:.1f} pixels within a window: with one camera "
                     "this cannot be corrected, because wrong depths explain a wrong motion, and a "
                     "quarter to half of the points may be off by more than 10 %; a second camera, "
-                    "or a tracker with an IMU, helps",
+                    "or a tracker with an IMU, helps; a wrong clock of the poses, lens or focal "
+                    "length blurs them, too",
                     motion.meanBlurPx())};
   }
   if (2 * motion.corrected <= motion.known) return std::nullopt;
@@ -289,7 +291,8 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
       "poses-blur",
       fmt::format("the poses blur the events by {:.1f} pixels within a window, and the motion of "
                   "{} of {} keyframes was corrected ([refinement] correct_motion): they are {:.2f} "
-                  "times as sharp{}",
+                  "times as sharp{}; a wrong calibration between the cameras, or clocks some ms "
+                  "apart, blur them, too",
                   motion.meanBlurPx(), motion.corrected, status.counts.keyframes, motion.meanGain(),
                   status.refinement ? ""
                                     : "; their own poses have such errors, too: --set "
@@ -303,7 +306,7 @@ void dropExplainedBlur(std::vector<Warning>& warnings) {
       "camera-clocks",  "events-mirrored",   "sensor-area",     "long-lever",
       "no-motion",      "rotation-only",     "speed",           "rotation-rate",
       "pose-jump",      "two-trajectories",  "pose-frame",      "camera-frame",
-      "poses-frozen",   "pose-interpolation"};
+      "poses-frozen",   "pose-interpolation", "extrinsics"};
   const auto isMistake = [&](const Warning& warning) {
     return std::find(std::begin(kMistakes), std::end(kMistakes), warning.name) !=
            std::end(kMistakes);

@@ -387,9 +387,16 @@ class Map:
         return [(warning["name"], _engine.python_text(warning["text"])) for warning in self.report["warnings"]]
 
     @property
-    def doubts(self) -> list[str]:
-        """Reasons why the map has little evidence; usually none."""
-        return self._finished().doubts
+    def quality(self) -> dict[str, Any]:
+        """How good the map is, by its own evidence.
+
+        ``word`` ("good", "doubtful", "wrong" or "unknown"), ``wrong_share`` (predicted fraction of depths that are off
+        by more than 10 %), ``depth_error`` (predicted median, relative), ``support`` and ``agreement`` (the fraction of
+        depths that a neighbouring keyframe has, too, and the fraction of these that agree within 10 %), ``reasons``
+        (texts), ``keyframes`` (the predicted fraction of right depths of each), ``left_out`` (keyframes without points).
+        """
+        quality: dict[str, Any] = self.report["quality"]
+        return quality
 
     def save(self, path: Path) -> None:
         """Write the points as .ply or .pcd."""

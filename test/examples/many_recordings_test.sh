@@ -67,7 +67,7 @@ expect "calls after one more run" "$(wc -l <calls)" 7
 mv broken $'br\303\266ken one' # as `printf %q` writes names in a C locale
 (LC_ALL=C printf '%q\n' br*) | sed "s/$/ --calibration 'one slider\/camchain.yaml'/" >names
 expect "escaped name" "$(cat names)" '$*303*266*'
-sed -i 's/"doubtful"/"of before"/; s/^{/{ "doubtful": ["few events"],/' "out/one slider/report.json"
+sed -i 's/"quality"/"of before"/; s/^{/{ "quality": {"word": "doubtful", "reasons": ["few events"]},/' "out/one slider/report.json"
 map 0 names
 expect "row of the name" "$(row $'br\303\266ken')" $'br\303\266ken one mapped *'
 expect "doubtful row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider mapped *doubtful: few events*"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <variant>
 
 #include "mapping/geometry/rigid3.h"
@@ -160,6 +161,23 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
           {"last_error", live.last_error}};
 }
 
+Json asJson(const MapQuality& quality) {
+  Json json = {{"word", std::string(nameOf(quality.word))}};
+  if (quality.word != QualityWord::kUnknown) {
+    json["wrong_share"] = quality.wrong_share;
+    json["depth_error"] = quality.depth_error;
+    json["support"] = quality.support;
+    if (quality.agreement) json["agreement"] = *quality.agreement;
+  }
+  json["left_out"] = quality.left_out;
+  json["reasons"] = quality.reasons;
+  json["keyframes"] = Json::array();
+  for (const float right : quality.keyframes) {
+    json["keyframes"].push_back(std::round(1000 * double{right}) / 1000);
+  }
+  return json;
+}
+
 Json asJson(const ReferenceView& view) {
   return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
@@ -245,7 +263,7 @@ std::string reportJson(const MapReport& report) {
   if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
   if (!report.notes.empty()) json["notes"] = asJson(report.notes);
-  if (!report.doubts.empty()) json["doubtful"] = report.doubts;
+  json["quality"] = asJson(report.quality);
   if (const MotionCounts& motion = report.counts.motion; motion.known > 0) {
     json["motion"] = {{"known", motion.known},
                       {"corrected", motion.corrected},
@@ -355,8 +373,8 @@ std::string filesText(const MapReport& report, OutputKind kind,
 std::string summaryOf(const MapReport& report, OutputKind kind,
                       const std::filesystem::path& folder) {
   std::string text;
-  if (!report.doubts.empty()) {
-    text = fmt::format("doubtful: {}\n", fmt::join(report.doubts, "; "));
+  if (report.quality.word != QualityWord::kUnknown) {
+    addLine(text, "quality", textOf(report.quality));
   }
   if (kind == OutputKind::kMap) {
     addLine(text, "keyframes", std::to_string(report.counts.keyframes));

@@ -77,7 +77,7 @@ struct MapReport {
   std::uint64_t skipped_events = 0;  ///< Bad events that the reader left out.
   std::vector<Warning> warnings;
   std::vector<Warning> notes;       ///< What could not be checked.
-  std::vector<std::string> doubts;  ///< Reasons why the map has little evidence; usually none.
+  MapQuality quality;
 };
 
 /// Writes the number of points and their extents into the report.
@@ -97,8 +97,8 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// (the fraction of the recording that was mapped), live in live operation (drop_ratio; counts of
 /// each camera's events before the mapping; windows_given_up and the reasons; late_events,
 /// pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each with name and
-/// text), notes (the same; absent if there are none: what could not be checked), doubtful (reasons
-/// why the map has little evidence; absent if there are none), recording (the files), perturbation
+/// text), notes (the same; absent if there are none), quality (see MapQuality: word, wrong_share,
+/// depth_error, support, agreement if known, reasons, keyframes), recording (the files), perturbation
 /// (the faults of the poses, if any), chosen (the automatic options: key, value and reason),
 /// options (all options with the used values) and version. Bytes of names that are not UTF-8 become
 /// U+FFFD.

@@ -25,8 +25,8 @@ TEST_F(MapCommand, CountsOfTheReportAddUp) {
   write(recording);
   const Result result = run("map rig.ini data --out out -v --strict");
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.notes, HasSubstr("note: poses-unchecked: the clock of the poses could not "));
-  EXPECT_EQ(reportIn("out")["notes"][0]["name"], "poses-unchecked");
+  EXPECT_THAT(result.out, HasSubstr("the clock of the poses could not be checked"));
+  EXPECT_EQ(reportIn("out")["quality"]["keyframes"].size(), 4U);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 4) << "a line per keyframe";
   EXPECT_THAT(result.err, HasSubstr("keyframe 1 at 10.102000000 s (+0.1 s): 639 events, "));
   const auto poses = posesIn("out");
@@ -62,6 +62,23 @@ TEST_F(MapCommand, CountsOfTheReportAddUp) {
   EXPECT_EQ(report["options"]["dsi"]["num_planes"], 30);
   EXPECT_EQ(report["reference_view"]["fx"], 100);
   EXPECT_NEAR(report["baseline_m"], 0.1, 1e-9);
+}
+
+TEST_F(MapCommand, BadKeyframesCanBeLeftOutAndTheChecksSwitchedOff) {
+  SyntheticRecording recording;
+  write(recording);
+  const std::string map = "map rig.ini data --out out --force ";
+  ASSERT_EQ(run(map).status, 0);
+  const json quality = reportIn("out")["quality"];
+  EXPECT_EQ(quality["left_out"], 0);
+  ASSERT_EQ(quality["keyframes"].size(), 4U);
+  const Result none = run(map + "--set map.min_keyframe_quality=1");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_THAT(none.err, HasSubstr("no-points: "));
+  EXPECT_EQ(reportIn("out")["quality"]["left_out"], 4);
+  const Result unchecked = run(map + "--set checks.enabled=false --strict");
+  EXPECT_EQ(unchecked.status, 0) << unchecked.err;
+  EXPECT_EQ(reportIn("out")["quality"]["word"], "unknown");
 }
 
 TEST_F(MapCommand, TheMaximaOfTheSavedDsiAreTheConfidences) {

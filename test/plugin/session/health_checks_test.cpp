@@ -426,28 +426,6 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
   }
 }
 
-TEST(HealthChecks, DepthsThatRestOnLittleEvidenceAreDoubted) {
-  DepthPlanesOptions planes;
-  /// Returns the doubts about a wall at 2 m, seen from 0.1 m farther along x each time.
-  const auto doubtsOf = [&](double second_m, double parallax_px_m, std::uint64_t at_farthest) {
-    DepthStatistics statistics(planes);
-    for (const double depth_m : {2.0, second_m, 2.0}) {
-      KeyframeDepthMap keyframe;
-      keyframe.view = {64, 48, 50, 50, 31.5, 23.5};
-      keyframe.map.depth = cv::Mat1f(48, 64, static_cast<float>(depth_m));
-      keyframe.map.pixels = {1000, 0, at_farthest, 0};
-      keyframe.parallax_px_m = parallax_px_m;
-      statistics.add(keyframe);
-    }
-    return statistics.doubts();
-  };
-  EXPECT_THAT(doubtsOf(2.1, 8, 300), IsEmpty());
-  EXPECT_THAT(doubtsOf(2.5, 8, 300), ElementsAre(HasSubstr("agree within 10 % in 0 % of the")));
-  EXPECT_THAT(doubtsOf(2.1, 2.8, 300), ElementsAre(HasSubstr("parallax of the scene is 1.4 px")));
-  EXPECT_THAT(doubtsOf(2.1, 3.2, 300), IsEmpty()) << "keyframes confirm it";
-  EXPECT_THAT(doubtsOf(2.1, 8, 500), ElementsAre(HasSubstr("50 % to the farthest, 5 m")));
-}
-
 TEST(HealthChecks, AMistakeOfThePosesExplainsTheirBlur) {
   std::vector<Warning> warnings = {{"sorted-events", ""}, {"poses-blur", ""}};
   dropExplainedBlur(warnings);

@@ -252,6 +252,7 @@ function draw(count = map.points) {
   gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   const lines = linesNow();
   drawLines(lines.frusta, view, [...styleColour("--camera"), 0.75], 1.2 * ratio);
+  drawLines(lines.bad, view, [...styleColour("--bad"), 1], 1.8 * ratio);
   drawLines(lines.path, view, [...styleColour("--path"), 0.9], 1.8 * ratio);
   drawLines(lines.selected, view, [...styleColour("--accent"), 1], 2.5 * ratio);
   gl.disable(gl.BLEND);

@@ -21,6 +21,10 @@ function frustumLines(number) {
   return corners.flatMap((corner, i) => [p, corner, corner, corners[(i + 1) % 4]]);
 }
 const lastShown = () => Math.min(shown.time, keyframes.length - 1);
+/// Whether a keyframe is much worse than the others, by the report.
+const keyframeQuality = report.quality ? report.quality.keyframes : [];
+const leastQuality = 0.6 * ([...keyframeQuality].sort((a, b) => a - b)[keyframeQuality.length >> 1] || 0);
+const isBad = number => keyframeQuality[number] < leastQuality;
 const hasFrustum = number => number % frustumStride === 0;
 
 let lineCache = {};
@@ -30,13 +34,14 @@ function linesNow() {
   for (const lines of Object.values(lineCache.gl === gl && lineCache.lines || {})) {
     gl.deleteVertexArray(lines.vertices);
   }
-  const path = [], frusta = [];
+  const path = [], frusta = [], bad = [];
   for (let i = 0; i <= lastShown(); ++i) {
     if (shown.path && i > 0) path.push(keyframes[i - 1].p, keyframes[i].p);
-    if (shown.frusta && hasFrustum(i) && i !== shown.selected) frusta.push(...frustumLines(i));
+    if (shown.frusta && isBad(i)) bad.push(...frustumLines(i));
+    else if (shown.frusta && hasFrustum(i) && i !== shown.selected) frusta.push(...frustumLines(i));
   }
   const selected = shown.selected < 0 ? [] : frustumLines(shown.selected);
-  const lines = {path: lineBuffer(path), frusta: lineBuffer(frusta),
+  const lines = {path: lineBuffer(path), frusta: lineBuffer(frusta), bad: lineBuffer(bad),
                  selected: lineBuffer(selected)};
   lineCache = {key, gl, lines};
   return lines;
@@ -117,7 +122,8 @@ function select(number) {
     const keyframe = keyframes[number];
     const at = add(keyframe.p, centre).map(value => value.toFixed(2)).join(", ");
     element("keyframe-text").textContent =
-      `${number + 1} of ${keyframes.length}, t = ${keyframe.t} s, at (${at}) m`;
+      `${number + 1} of ${keyframes.length}, t = ${keyframe.t} s, at (${at}) m` +
+      (isBad(number) ? "; much worse than the others" : "");
     element("picture").alt = `Depth map of keyframe ${number + 1}`;
     element("event-picture").alt = `Events of keyframe ${number + 1}`;
     const file = document.createElement("a");

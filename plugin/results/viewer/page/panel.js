@@ -50,7 +50,17 @@ function showNumbers() {
   }
   addRow("report", "version", report.version);
 
-  const doubts = (report.doubtful || []).map((text) => ({ name: "doubtful", text }));
+  const quality = report.quality || {word: "unknown", reasons: []};
+  const percent = (value, digits) => `${(100 * value).toFixed(digits)} %`;
+  if (quality.wrong_share !== undefined) {
+    addRow("report", "quality", `${quality.word}: ${percent(quality.wrong_share, 0)} of the depths wrong by estimate, ` +
+      `median error ${percent(quality.depth_error, 1)}`);
+  }
+  if (quality.agreement !== undefined) {
+    addRow("report", "support", `${percent(quality.support, 0)} of the depths are in two keyframes, which agree in ` +
+      percent(quality.agreement, 0));
+  }
+  const doubts = quality.reasons.map((text) => ({ name: quality.word, text }));
   for (const [kind, texts] of [["warning", doubts.concat(report.warnings)], ["note", report.notes || []]]) {
     element(`${kind}-section`).hidden = texts.length === 0;
     for (const {name, text} of texts) {

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/map_quality.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
+
+namespace efm {
+namespace {
+
+constexpr NamedChoice<QualityWord> kWords[] = {{QualityWord::kUnknown, "unknown"},
+                                               {QualityWord::kGood, "good"},
+                                               {QualityWord::kDoubtful, "doubtful"},
+                                               {QualityWord::kWrong, "wrong"}};
+
+// Fitted to maps of simulated recordings with and without faults: docs/recordings.md.
+constexpr double kWrongPerExpected = 1.3;  // the probability knows few of the causes
+constexpr double kUsualExpected = 0.035;    // more has a cause that it does not know
+constexpr double kWrongPerUnusual = 20;
+constexpr double kUsualAgreement = 0.97;
+constexpr double kUsualSupport = 0.2;
+constexpr double kWrongPerSupport = 0.7;
+constexpr double kUsualMotion = 0.5;
+constexpr double kWrongPerMotion = 0.3;
+constexpr double kWrongByMistake = 0.3;
+constexpr double kGoodBelow = 0.09;
+constexpr double kWrongAbove = 0.35;
+constexpr double kWorthSaying = 0.05;
+
+constexpr std::uint32_t kMinShared = 100;  // points; fewer tell nothing
+constexpr double kFewDepths = 200;
+constexpr double kConfirmed = 1000;  // shared points that agree confirm a small parallax
+constexpr double kAloneParallaxPx = 2;
+constexpr double kMinParallaxPx = 1.5;
+constexpr double kMaxAtEnds = 0.4;  // fraction of the pixels with contrast
+
+/// Returns the fraction of wrong depths for a mean of 1 - probability.
+double wrongBy(double expected) {
+  return std::min(1.0, kWrongPerExpected * expected +
+                           kWrongPerUnusual * std::max(0.0, expected - kUsualExpected));
+}
+
+double ratio(double part, double whole) { return whole > 0 ? part / whole : 0; }
+
+}  // namespace
+
+std::string_view nameOf(QualityWord word) { return nameIn(kWords, word); }
+
+void QualityStatistics::add(const KeyframeDepthMap& keyframe, const QualityFacts& facts) {
+  const DepthMap& map = keyframe.map;
+  Keyframe& added = keyframes_.emplace_back();
+  std::vector<double> depths_m, errors;
+  double wrong = 0, too_far = 0;
+  std::uint32_t known = 0;
+  for (int y = 0; y < map.depth.rows; ++y) {
+    for (int x = 0; x < map.depth.cols; ++x) {
+      const double depth_m = map.depth(y, x);
+      if (!(depth_m > 0)) continue;
+      depths_m.push_back(depth_m);
+      too_far += depth_m > facts.sure_depth_m ? 1 : 0;
+      errors.push_back(depth_m * std::sqrt(double{map.variance(y, x)}));
+      if (map.probability.empty() || std::isnan(map.probability(y, x))) continue;
+      wrong += 1 - map.probability(y, x);
+      ++known;
+    }
+  }
+  added.depths = static_cast<std::uint32_t>(depths_m.size());
+  added.too_far = static_cast<float>(ratio(too_far, added.depths));
+  added.t_ref_ns = keyframe.window.t_ref_ns;
+  added.wrong = static_cast<float>(ratio(wrong, known));
+  if (!depths_m.empty()) {
+    constexpr double kMedianOfSigma = 0.67;  // of a normal distribution
+    added.depth_error = static_cast<float>(kMedianOfSigma * upperMedian(errors));
+    added.parallax_px = static_cast<float>(keyframe.parallax_px_m / upperMedian(depths_m));
+  }
+  added.before = sharedWithLast(keyframe);
+  pixels_ += map.pixels;
+  last_ = {};
+  last_.map.depth = map.depth;
+  last_.view = keyframe.view;
+  last_.T_world_ref = keyframe.T_world_ref;
+}
+
+/// Projects the points of the last keyframe into this keyframe, and compares depths.
+QualityStatistics::Shared QualityStatistics::sharedWithLast(
+    const KeyframeDepthMap& keyframe) const {
+  constexpr double kWithin = 1.105;
+  const Rigid3 T_ref_last = keyframe.T_world_ref.inverse() * last_.T_world_ref;
+  const cv::Mat1f& depth = keyframe.map.depth;
+  const cv::Rect view({}, depth.size());
+  Shared result;
+  for (int v = 0; v < last_.map.depth.rows; ++v) {
+    for (int u = 0; u < last_.map.depth.cols; ++u) {
+      const double last_m = last_.map.depth(v, u);
+      if (!(last_m > 0)) continue;
+      const Eigen::Vector3d p_ref = T_ref_last * last_.view.pointAt(u, v, last_m);
+      if (p_ref.z() <= 0) continue;
+      const Eigen::Vector2d pixel = keyframe.view.project(p_ref);
+      if (!view.contains(cv::Point2d(pixel.x(), pixel.y()))) continue;
+      const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+      bool shared = false, agrees = false;
+      for (const float here_m : depth(cv::Rect(at.x - 1, at.y - 1, 3, 3) & view)) {
+        shared = shared || here_m > 0;
+        agrees = agrees || (here_m < kWithin * p_ref.z() && kWithin * here_m > p_ref.z());
+      }
+      result.points += shared ? 1 : 0;
+      result.agreeing += agrees ? 1 : 0;
+    }
+  }
+  return result;
+}
+
+double QualityStatistics::rightShareOf(std::size_t keyframe) const {
+  // A tracker's jump separates a keyframe from one neighbour; a wrong keyframe agrees with none.
+  double agreement = -1;
+  for (std::size_t i = keyframe; i <= keyframe + 1 && i < keyframes_.size(); ++i) {
+    const Shared& shared = keyframes_[i].before;
+    if (shared.points < kMinShared) continue;
+    agreement = std::max(agreement, ratio(shared.agreeing, shared.points));
+  }
+  const double right = 1 - wrongBy(double{keyframes_[keyframe].wrong});
+  return agreement < 0 ? right : right * (1 - std::max(0.0, kUsualAgreement - agreement));
+}
+
+MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlanesOptions& planes,
+                                      std::size_t num_cameras) const {
+  MapQuality result;
+  double depths = 0, wrong = 0, shared = 0, agreeing = 0, too_far = 0;
+  std::vector<double> errors, parallaxes_px;
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    const Keyframe& keyframe = keyframes_[i];
+    depths += keyframe.depths;
+    wrong += keyframe.depths * double{keyframe.wrong};
+    too_far += keyframe.depths * double{keyframe.too_far};
+    shared += keyframe.before.points;
+    agreeing += keyframe.before.agreeing;
+    result.keyframes.push_back(static_cast<float>(rightShareOf(i)));
+    if (keyframe.depths == 0) continue;
+    errors.push_back(keyframe.depth_error);
+    parallaxes_px.push_back(keyframe.parallax_px);
+  }
+  if (depths == 0) return result;
+  const bool compared = shared >= kMinShared;
+  if (compared) result.agreement = agreeing / shared;
+  result.support = keyframes_.size() > 1 ? shared / depths : 0;
+  result.depth_error = upperMedian(errors);
+
+  // What makes depths wrong, one beside the other.
+  const double by_probability = wrongBy(wrong / depths);
+  const double by_agreement = compared ? std::max(0.0, kUsualAgreement - *result.agreement) : 0;
+  const double by_support =
+      keyframes_.size() > 1 ? kWrongPerSupport * std::max(0.0, kUsualSupport - result.support) : 0;
+  const double by_motion =
+      facts.motion_agreement ? kWrongPerMotion * std::max(0.0, kUsualMotion - *facts.motion_agreement) : 0;
+  const double by_cameras = 1 - (1 - too_far / depths) * (1 - facts.wrong_by_cameras);
+  double right = 1;
+  for (const double part : {by_probability, by_agreement, by_support, by_motion, by_cameras}) {
+    right *= 1 - part;
+  }
+  if (!facts.mistake.empty()) right *= 1 - kWrongByMistake;
+  result.wrong_share = 1 - right;
+
+  std::vector<std::string>& reasons = result.reasons;
+  if (!facts.mistake.empty()) reasons.push_back("see the warning " + facts.mistake);
+  if (by_agreement > kWorthSaying) {
+    reasons.push_back(
+        fmt::format("keyframes in a row agree within 10 % in {:.0f} % of the points that they "
+                    "share: the clock, the poses or the calibration may be wrong",
+                    100 * *result.agreement));
+  }
+  nameBadKeyframes(result);
+  const double parallax_px = upperMedian(parallaxes_px);
+  if (parallax_px < (agreeing < kConfirmed ? kAloneParallaxPx : kMinParallaxPx)) {
+    reasons.push_back(
+        fmt::format("the parallax of the scene is {:.2g} px in a window", parallax_px));
+  }
+  const auto candidates = static_cast<double>(pixels_.candidates);
+  const double at_nearest = ratio(static_cast<double>(pixels_.at_nearest), candidates);
+  const double at_farthest = ratio(static_cast<double>(pixels_.at_farthest), candidates);
+  if (at_nearest + at_farthest > kMaxAtEnds) {
+    reasons.push_back(fmt::format(
+        "{:.0f} % of the pixels with contrast fit best to the nearest plane, {:g} m, and "
+        "{:.0f} % to the farthest, {:g} m ([dsi] min_depth_m, max_depth_m)",
+        100 * at_nearest, planes.min_depth_m, 100 * at_farthest, planes.max_depth_m));
+  }
+  if (depths < kFewDepths) reasons.push_back(fmt::format("there are {:.0f} depths", depths));
+  if (by_probability > kWorthSaying) reasons.push_back("many depths are not sure by themselves");
+  if (by_support > kWorthSaying) {
+    reasons.push_back(
+        fmt::format("{:.0f} % of the depths are in two keyframes", 100 * result.support));
+  }
+  if (by_motion > kWorthSaying) {
+    reasons.push_back(
+        fmt::format("the depths by all cameras and those by the motion of one agree in {:.0f} %",
+                    100 * *facts.motion_agreement));
+  }
+  if (by_cameras > kWorthSaying) {
+    reasons.push_back(fmt::format(
+        "the maps of single cameras lie beside each other: the calibration between cameras makes "
+        "{:.0f} % of the depths wrong",
+        100 * by_cameras));
+  }
+  reasons.insert(reasons.end(), facts.doubts.begin(), facts.doubts.end());
+  const bool is_doubtful = !reasons.empty();
+  if (!compared) reasons.push_back("no second keyframe has enough of the same points");
+  if (!facts.unchecked.empty()) reasons.push_back(facts.unchecked);
+  // One camera alone cannot check its depths without another keyframe and known poses.
+  const bool is_alone = num_cameras < 2 && reasons.size() > 0;
+  if (is_alone || (!compared && !reasons.empty())) {
+    reasons.push_back(num_cameras < 2
+                          ? "a second camera, 1.5 s or more, or motion sideways would help"
+                          : "more time would help");
+  }
+  result.word = result.wrong_share > kWrongAbove ? QualityWord::kWrong
+                : is_doubtful || is_alone || result.wrong_share > kGoodBelow
+                    ? QualityWord::kDoubtful
+                    : QualityWord::kGood;
+  return result;
+}
+
+/// Names the keyframes that are much worse than the others.
+void QualityStatistics::nameBadKeyframes(MapQuality& quality) const {
+  constexpr float kMuchWorse = 0.6F;  // of the median
+  constexpr std::size_t kMostNamed = 5;
+  if (keyframes_.size() < 3) return;
+  std::vector<double> all(quality.keyframes.begin(), quality.keyframes.end());
+  const auto least = kMuchWorse * static_cast<float>(upperMedian(all));
+  std::string names;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    if (quality.keyframes[i] >= least || keyframes_[i].depths == 0) continue;
+    if (++count <= kMostNamed) names += fmt::format("{}{}", names.empty() ? "" : ", ", i + 1);
+  }
+  if (count == 0) return;
+  quality.reasons.push_back(
+      fmt::format("keyframe{} {}{}: much worse than the others; a jump of the tracker? ([map] "
+                  "min_keyframe_quality leaves such keyframes out)",
+                  count > 1 ? "s" : "", names,
+                  count > kMostNamed ? fmt::format(" and {} more", count - kMostNamed) : ""));
+}
+
+std::string textOf(const MapQuality& quality) {
+  std::string text(nameOf(quality.word));
+  if (quality.word != QualityWord::kUnknown) {
+    text += fmt::format(": {:.0f} % of the depths wrong by estimate, median error {:.1f} %",
+                        100 * quality.wrong_share, 100 * quality.depth_error);
+    if (quality.agreement) {
+      text += fmt::format("; {:.0f} % are in two keyframes, which agree in {:.0f} %",
+                          100 * quality.support, 100 * *quality.agreement);
+    }
+  }
+  if (quality.left_out > 0) {
+    text += fmt::format("; {} keyframes are left out of the map", quality.left_out);
+  }
+  for (const std::string& reason : quality.reasons) text += "; " + reason;
+  return text;
+}
+
+}  // namespace efm
