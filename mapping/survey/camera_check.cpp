@@ -315,6 +315,7 @@ class CameraFit {
     const bool zooms = zoomed.correlation - whole.correlation >= kMinZoomGain;
     if (zooms) value[kZoom] = zoomed.value[kZoom];
     const Parameters errors = errorsOf(all, whole);
+    result.correlation = whole.correlation;
     const bool blurred = (zooms ? zoomed : whole).baseline_rms >= kBlurredPercent ||
                          whole.correlation < kMinCorrelation;
     const double along_rad = kRadiansPerDegree * std::abs(blurred ? value[1] : turned.value[1]);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "mapping/events/event.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/camera_check.h"
 #include "mapping/survey/depth_agreement.h"
@@ -42,37 +43,55 @@ EventPacket subsampled(const EventPacket& packet) {
   return chosen;
 }
 
+/// Returns the fraction of the depths that a fault between two cameras makes wrong, beside those
+/// beyond its sure depth. Measured with simulated recordings.
+double wrongBy(const CameraComparison& found) {
+  const double angle_deg = found.angle_rad / kRadiansPerDegree;
+  switch (found.fault) {
+    case CameraFault::kAcross:
+      return std::min(0.6, 0.4 * angle_deg);
+    case CameraFault::kRoll:
+      return std::min(0.6, 0.2 * angle_deg);
+    case CameraFault::kClock:
+      return std::min(0.6, 0.06 * found.shift_px);
+    case CameraFault::kFocalLength:
+      return std::min(0.7, 0.12 * found.shift_px);
+    case CameraFault::kUnknown:
+      return 0.25;
+    default:
+      return 0;
+  }
+}
+
 /// Takes the comparison of two cameras into a verdict.
 void use(const CameraComparison& found, const Rig& rig, PoseVerdict& verdict) {
-  // Of the shift of the maps, pixels; measured with simulated recordings.
-  constexpr double kWrongPerPx = 0.12;
-  constexpr double kMostWrong = 0.7;
   QualityFacts& quality = verdict.quality;
-  quality.sure_depth_m = std::min(quality.sure_depth_m, found.sure_depth_m);
+  quality.wrong_by_cameras = std::max(quality.wrong_by_cameras, wrongBy(found));
   if (found.fault == CameraFault::kUnknown) {
     quality.doubts.push_back(fmt::format(
         "the maps of cameras {} and {} alone differ, and the poses blur the events too much to "
         "tell whether the calibration between the cameras is wrong",
         found.other, found.camera));
+  } else {
+    quality.sure_depth_m = std::min(quality.sure_depth_m, found.sure_depth_m);
   }
-  auto warning = cameraWarning(found, rig);
-  if (!warning) return;
-  quality.wrong_by_cameras =
-      std::max(quality.wrong_by_cameras, std::min(kMostWrong, kWrongPerPx * found.shift_px));
-  verdict.warnings.push_back(std::move(*warning));
-  verdict.keep_motion = true;
+  if (auto warning = cameraWarning(found, rig)) {
+    verdict.warnings.push_back(std::move(*warning));
+    verdict.keep_motion = true;
+  }
 }
 
-/// Returns whether a comparison of the cameras explains the events better than a mistake of a clock.
-/// The comparison sees offsets of some milliseconds, which the mistake's search cannot.
+/// Returns whether a comparison of the cameras explains the events better than a mistake of a
+/// clock. The comparison sees offsets of some milliseconds, which the search for mistakes cannot.
 bool explainsMore(const std::vector<CameraComparison>& compared, const PoseFinding& finding) {
-  constexpr double kSeenS = 0.015;  // larger offsets may hide from the comparison
+  constexpr double kSeenS = 0.05;  // larger offsets may hide from the comparison,
+  constexpr double kFit = 0.6;     // and so may all if the maps do not fit
   const bool is_clock = finding.mistake == PoseMistake::kCameraClock;
   if (!is_clock && finding.mistake != PoseMistake::kTimeShift) return false;
   return std::any_of(compared.begin(), compared.end(), [&](const CameraComparison& found) {
     const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
     return is_named || (is_clock && found.camera == static_cast<int>(*finding.camera) &&
-                        std::abs(finding.shift_s) < kSeenS);
+                        found.correlation >= kFit && std::abs(finding.shift_s) < kSeenS);
   });
 }
 
@@ -107,7 +126,8 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
         warnings.push_back(std::move(*warning));
       }
     }
-    if (warnings.empty() && finding != nullptr) warnings.push_back(poseWarning(*finding, survey.rig));
+    if (warnings.empty() && finding != nullptr)
+      warnings.push_back(poseWarning(*finding, survey.rig));
   }
   if (!warnings.empty()) quality.mistake = warnings.front().name;
   append(verdict.warnings, std::move(warnings));

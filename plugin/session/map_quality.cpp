@@ -19,15 +19,16 @@ constexpr NamedChoice<QualityWord> kWords[] = {{QualityWord::kUnknown, "unknown"
 
 // Fitted to maps of simulated recordings with and without faults: docs/recordings.md.
 constexpr double kWrongPerExpected = 1.3;  // the probability knows few of the causes
-constexpr double kUsualExpected = 0.035;    // more has a cause that it does not know
+constexpr double kUsualExpected = 0.035;   // more has a cause that it does not know
 constexpr double kWrongPerUnusual = 20;
 constexpr double kUsualAgreement = 0.97;
 constexpr double kUsualSupport = 0.2;
 constexpr double kWrongPerSupport = 0.7;
 constexpr double kUsualMotion = 0.5;
 constexpr double kWrongPerMotion = 0.3;
-constexpr double kWrongByMistake = 0.3;
+constexpr double kWrongByMistake = 0.25;
 constexpr double kGoodBelow = 0.09;
+constexpr double kGoodBelowOfOne = 0.03;  // one camera: a wrong motion looks like other depths
 constexpr double kWrongAbove = 0.35;
 constexpr double kWorthSaying = 0.05;
 
@@ -155,7 +156,9 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
   const double by_support =
       keyframes_.size() > 1 ? kWrongPerSupport * std::max(0.0, kUsualSupport - result.support) : 0;
   const double by_motion =
-      facts.motion_agreement ? kWrongPerMotion * std::max(0.0, kUsualMotion - *facts.motion_agreement) : 0;
+      facts.motion_agreement
+          ? kWrongPerMotion * std::max(0.0, kUsualMotion - *facts.motion_agreement)
+          : 0;
   const double by_cameras = 1 - (1 - too_far / depths) * (1 - facts.wrong_by_cameras);
   double right = 1;
   for (const double part : {by_probability, by_agreement, by_support, by_motion, by_cameras}) {
@@ -205,18 +208,15 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
         100 * by_cameras));
   }
   reasons.insert(reasons.end(), facts.doubts.begin(), facts.doubts.end());
-  const bool is_doubtful = !reasons.empty();
-  if (!compared) reasons.push_back("no second keyframe has enough of the same points");
   if (!facts.unchecked.empty()) reasons.push_back(facts.unchecked);
-  // One camera alone cannot check its depths without another keyframe and known poses.
-  const bool is_alone = num_cameras < 2 && reasons.size() > 0;
-  if (is_alone || (!compared && !reasons.empty())) {
-    reasons.push_back(num_cameras < 2
-                          ? "a second camera, 1.5 s or more, or motion sideways would help"
-                          : "more time would help");
+  const bool is_alone = num_cameras < 2;
+  if (is_alone && !compared) reasons.push_back("no second keyframe has the same points");
+  if (!facts.unchecked.empty() || (is_alone && !compared)) {
+    reasons.push_back(is_alone ? "a second camera, 1.5 s or more, or motion sideways would help"
+                               : "more time, or a motion that changes, would help");
   }
   result.word = result.wrong_share > kWrongAbove ? QualityWord::kWrong
-                : is_doubtful || is_alone || result.wrong_share > kGoodBelow
+                : !reasons.empty() || result.wrong_share > (is_alone ? kGoodBelowOfOne : kGoodBelow)
                     ? QualityWord::kDoubtful
                     : QualityWord::kGood;
   return result;

@@ -49,8 +49,11 @@ TEST(MapQuality, IsGoodWithEvidenceAndSaysWhyItIsNot) {
     const char* reason;
   } kWalls[] = {
       {"right", [](Wall&) {}, QualityWord::kGood, ""},
-      {"keyframes that differ", [](Wall& w) { w.depths_m = {2, 2.5, 2, 2.5}; }, QualityWord::kWrong,
-       "agree within 10 % in 0 % of the"},
+      {"keyframes that differ",
+       [](Wall& w) {
+         w.depths_m = {2, 2.5, 2, 2.5};
+       },
+       QualityWord::kWrong, "agree within 10 % in 0 % of the"},
       {"no parallax", [](Wall& w) { w.parallax_px_m = 2.8; }, QualityWord::kDoubtful,
        "parallax of the scene is 1.4 px"},
       {"little parallax, but keyframes confirm it", [](Wall& w) { w.parallax_px_m = 3.4; },
@@ -66,8 +69,8 @@ TEST(MapQuality, IsGoodWithEvidenceAndSaysWhyItIsNot) {
        [](Wall& w) { w.num_cameras = 1, w.facts.unchecked = "the poses could not be checked"; },
        QualityWord::kDoubtful, "could not be checked"},
       {"two cameras, poses not checked",
-       [](Wall& w) { w.facts.unchecked = "the poses could not be checked"; }, QualityWord::kGood,
-       "could not be checked"},
+       [](Wall& w) { w.facts.unchecked = "the poses could not be checked"; },
+       QualityWord::kDoubtful, "could not be checked"},
       {"a wrong calibration", [](Wall& w) { w.facts.sure_depth_m = 2.02; }, QualityWord::kWrong,
        "calibration between cameras makes 50 %"},
       {"a mistake", [](Wall& w) { w.facts.mistake = "scale"; }, QualityWord::kDoubtful,
