@@ -25,6 +25,7 @@ constexpr int kFittedPixels = 1500;  // of a window
 constexpr double kWindowS = 0.2;
 constexpr std::size_t kMinWindows = 3;
 constexpr double kMinComparedS = 0.5;
+constexpr double kMinBaselineM = 1e-3;
 constexpr double kMinProbability = 0.8;  // of the depths that are compared
 /// Points beyond the farthest plane would be moved along the epipolar lines.
 constexpr double kFarther = 4;  // than the map's farthest plane
@@ -258,7 +259,9 @@ class OwnMaps {
 class CameraFit {
  public:
   /// @param T_ref_cam pose of the camera in the reference view.
-  explicit CameraFit(Rigid3 T_ref_cam) : T_ref_cam_(std::move(T_ref_cam)) {
+  /// @param baseline_m distance of the two cameras.
+  CameraFit(Rigid3 T_ref_cam, double baseline_m)
+      : T_ref_cam_(std::move(T_ref_cam)), baseline_m_(baseline_m) {
     Eigen::Vector3d across = T_ref_cam_.rotation.conjugate() * T_ref_cam_.translation;
     across.z() = 0;
     if (across.norm() < 1e-9) across = Eigen::Vector3d::UnitX();
@@ -319,7 +322,7 @@ class CameraFit {
     const bool blurred = (zooms ? zoomed : whole).baseline_rms >= kBlurredPercent ||
                          whole.correlation < kMinCorrelation;
     const double along_rad = kRadiansPerDegree * std::abs(blurred ? value[1] : turned.value[1]);
-    if (along_rad > 0) result.sure_depth_m = 0.1 * T_ref_cam_.translation.norm() / along_rad;
+    if (along_rad > 0) result.sure_depth_m = 0.1 * baseline_m_ / along_rad;
     const auto isProven = [&](int i) {
       const Limits& limits = kLimits[i];
       const double size = std::abs(value[i]);
@@ -368,8 +371,8 @@ class CameraFit {
     result.angle_rad = kRadiansPerDegree * std::abs(value[found]);
     result.R_cam_fitted = rotationBy(kRadiansPerDegree * (axes_ * value.head<3>()));
     std::vector<double> depths_m = depths_m_;
-    result.depth_change = kRadiansPerDegree * std::abs(value[1]) * upperMedian(depths_m) /
-                          T_ref_cam_.translation.norm();
+    result.depth_change =
+        kRadiansPerDegree * std::abs(value[1]) * upperMedian(depths_m) / baseline_m_;
   }
 
   /// Adds a time of the window: how far the rig moves the scene in 5 ms before and after it.
@@ -418,6 +421,7 @@ class CameraFit {
 
   static constexpr std::int64_t kClockNs = 5'000'000;
   Rigid3 T_ref_cam_;
+  double baseline_m_;
   Eigen::Matrix3d axes_;  // of the rotations, in the camera's frame
   std::vector<MapPair> pairs_;
   std::vector<double> depths_m_;               // of all pixels
@@ -450,9 +454,11 @@ std::vector<CameraComparison> compareCameras(const Rig& rig,
   if (seen_s < kMinComparedS) return {};
   std::vector<CameraComparison> comparisons;
   for (const int camera : cameras) {
-    if (camera == other) continue;
+    const double baseline_m =
+        (cameraAt(camera).T_rig_cam.translation - cameraAt(other).T_rig_cam.translation).norm();
+    if (baseline_m < kMinBaselineM) continue;  // no fused depth depends on the two cameras
     OwnMaps maps(rig, options, camera, ExtractionMethod::kPaper);
-    CameraFit fit(T_rig_ref.inverse() * cameraAt(camera).T_rig_cam);
+    CameraFit fit(T_rig_ref.inverse() * cameraAt(camera).T_rig_cam, baseline_m);
     double scale = 1;
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       if (!of_other[i]) continue;

@@ -102,6 +102,7 @@ QualityStatistics::Shared QualityStatistics::sharedWithLast(
       if (p_ref.z() <= 0) continue;
       const Eigen::Vector2d pixel = keyframe.view.project(p_ref);
       if (!view.contains(cv::Point2d(pixel.x(), pixel.y()))) continue;
+      ++result.in_view;
       const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
       bool shared = false, agrees = false;
       for (const float here_m : depth(cv::Rect(at.x - 1, at.y - 1, 3, 3) & view)) {
@@ -115,16 +116,34 @@ QualityStatistics::Shared QualityStatistics::sharedWithLast(
   return result;
 }
 
+/// Returns the median fraction of points in view that a keyframe shares with the one before it.
+double QualityStatistics::usualHits() const {
+  std::vector<double> hits;
+  for (const Keyframe& keyframe : keyframes_) {
+    const Shared& shared = keyframe.before;
+    if (shared.in_view >= kMinShared) hits.push_back(ratio(shared.points, shared.in_view));
+  }
+  return hits.empty() ? 0 : upperMedian(hits);
+}
+
 double QualityStatistics::rightShareOf(std::size_t keyframe) const {
   // A tracker's jump separates a keyframe from one neighbour; a wrong keyframe agrees with none.
-  double agreement = -1;
+  // Pixels that lie beside those of its neighbours agree by chance, but they are few.
+  constexpr double kFewHits = 0.7;  // of the usual ones
+  const double usual = kFewHits * usualHits();
+  double right = 0;
+  bool compared = false;
   for (std::size_t i = keyframe; i <= keyframe + 1 && i < keyframes_.size(); ++i) {
     const Shared& shared = keyframes_[i].before;
-    if (shared.points < kMinShared) continue;
-    agreement = std::max(agreement, ratio(shared.agreeing, shared.points));
+    if (shared.in_view < kMinShared) continue;
+    compared = true;
+    double with_neighbour = std::min(1.0, ratio(ratio(shared.points, shared.in_view), usual));
+    if (shared.points >= kMinShared) {
+      with_neighbour *= 1 - std::max(0.0, kUsualAgreement - ratio(shared.agreeing, shared.points));
+    }
+    right = std::max(right, with_neighbour);
   }
-  const double right = 1 - wrongBy(double{keyframes_[keyframe].wrong});
-  return agreement < 0 ? right : right * (1 - std::max(0.0, kUsualAgreement - agreement));
+  return (compared ? right : 1) * (1 - wrongBy(double{keyframes_[keyframe].wrong}));
 }
 
 MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlanesOptions& planes,
@@ -215,7 +234,8 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
     reasons.push_back(is_alone ? "a second camera, 1.5 s or more, or motion sideways would help"
                                : "more time, or a motion that changes, would help");
   }
-  result.word = result.wrong_share > kWrongAbove ? QualityWord::kWrong
+  const bool is_known = compared || !is_alone;
+  result.word = is_known && result.wrong_share > kWrongAbove ? QualityWord::kWrong
                 : !reasons.empty() || result.wrong_share > (is_alone ? kGoodBelowOfOne : kGoodBelow)
                     ? QualityWord::kDoubtful
                     : QualityWord::kGood;

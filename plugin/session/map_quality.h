@@ -70,6 +70,7 @@ class QualityStatistics {
  private:
   /// Points that a keyframe shares with the keyframe before it.
   struct Shared {
+    std::uint32_t in_view = 0;  // points of that keyframe in the view of this one
     std::uint32_t points = 0;
     std::uint32_t agreeing = 0;
   };
@@ -83,6 +84,7 @@ class QualityStatistics {
     Shared before;
   };
   void nameBadKeyframes(MapQuality& quality) const;
+  double usualHits() const;
   Shared sharedWithLast(const KeyframeDepthMap& keyframe) const;
 
   std::vector<Keyframe> keyframes_;
