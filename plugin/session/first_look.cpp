@@ -56,8 +56,8 @@ double wrongBy(const CameraComparison& found) {
       return std::min(0.6, 0.06 * found.shift_px);
     case CameraFault::kFocalLength:
       return std::min(0.7, 0.12 * found.shift_px);
-    case CameraFault::kUnknown:
-      return 0.25;
+    case CameraFault::kUnknown:  // mostly a tracker's error
+      return 0.05;
     default:
       return 0;
   }

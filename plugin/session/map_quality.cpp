@@ -26,9 +26,11 @@ constexpr double kUsualSupport = 0.2;
 constexpr double kWrongPerSupport = 0.7;
 constexpr double kUsualMotion = 0.5;
 constexpr double kWrongPerMotion = 0.3;
-constexpr double kWrongByMistake = 0.25;
+constexpr double kWrongByMistake = 0.1;  // of most: trackers, too, make the warnings
+constexpr double kWrongOfOne = 0.04;     // one camera: a wrong motion looks like other depths
+constexpr double kWrongIfUnchecked = 0.01;
 constexpr double kGoodBelow = 0.09;
-constexpr double kGoodBelowOfOne = 0.03;  // one camera: a wrong motion looks like other depths
+constexpr double kGoodBelowOfOne = 0.07;
 constexpr double kWrongAbove = 0.35;
 constexpr double kWorthSaying = 0.05;
 
@@ -184,6 +186,8 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
     right *= 1 - part;
   }
   if (!facts.mistake.empty()) right *= 1 - kWrongByMistake;
+  if (!facts.unchecked.empty()) right *= 1 - kWrongIfUnchecked;
+  if (num_cameras < 2) right *= 1 - kWrongOfOne;
   result.wrong_share = 1 - right;
 
   std::vector<std::string>& reasons = result.reasons;
