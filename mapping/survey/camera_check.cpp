@@ -109,7 +109,7 @@ struct MapPair {
 struct Sums {
   Information information = Information::Zero();
   Parameters gradient = Parameters::Zero();
-  double count = 0, xy = 0, xx = 0, yy = 0;
+  double xy = 0, xx = 0, yy = 0;
 
   void add(const MapPair& pair, std::size_t scale, const Parameters& now) {
     const cv::Mat1f& own = pair.own[scale];
@@ -126,7 +126,6 @@ struct Sums {
       const double weight = 1 / (1 + residual * residual);  // Cauchy
       information += weight * row.transpose() * row;
       gradient += weight * residual * row.transpose();
-      count += 1;
       xy += x * y;
       xx += x * x;
       yy += y * y;
@@ -153,7 +152,6 @@ Fit fit(const Pairs& pairs, int free, bool with_baseline, Parameters start, std:
   sigmas << 1e3, 1e3, 1e3, 4, 1, 10;
   const Parameters prior = sigmas.cwiseAbs2().cwiseInverse();
   Fit result{start};
-  result.value[kBaseline] = 0;
   std::vector<double> baselines(pairs.size(), 0.0);
   double count = 0;
   for (const MapPair* pair : pairs) count += static_cast<double>(pair->pixels.size());
@@ -200,7 +198,6 @@ Fit fit(const Pairs& pairs, int free, bool with_baseline, Parameters start, std:
     all.xy += sums.xy;
     all.xx += sums.xx;
     all.yy += sums.yy;
-    result.value[kBaseline] += baselines[i] / static_cast<double>(pairs.size());
     result.baseline_rms += baselines[i] * baselines[i] / static_cast<double>(pairs.size());
   }
   result.correlation = all.xy / std::sqrt(all.xx * all.yy + 1e-12);

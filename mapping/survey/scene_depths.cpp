@@ -103,10 +103,6 @@ std::pair<std::int64_t, std::int64_t> coveredBy(const WindowSample& sample,
   return {begin_ns, std::max(begin_ns, end_ns)};
 }
 
-}  // namespace
-
-namespace {
-
 /// @param length_ns length of a piece for the time that a sample covers, and the number of its
 /// pieces.
 template <typename Length>
@@ -160,8 +156,8 @@ std::vector<SamplePiece> piecesOf(const std::vector<WindowSample>& samples,
 
 namespace {
 
-/// Fewer certain points than a map needs: where poses have errors, far depths are less probable, and
-/// the range must reach them.
+/// Fewer certain points than a map needs: where poses have errors, far depths are less probable,
+/// and the range must reach them.
 constexpr double kCoarseProbability = 0.5;
 /// At the nearest plane, the distance of the cameras moves the view by this fraction of its width.
 /// Nearer objects are hardly seen twice.

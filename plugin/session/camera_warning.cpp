@@ -10,8 +10,6 @@
 namespace efm {
 namespace {
 
-constexpr const char* kLooksAlike = "extrinsics, principal point or lens";
-
 /// Returns the transforms of a Kalibr camera chain that change if a camera's pose does.
 std::string chainText(const Rig& rig, const CameraComparison& found) {
   std::vector<Rigid3> T_rig_cam;
@@ -56,16 +54,13 @@ std::optional<Warning> cameraWarning(const CameraComparison& found, const Rig& r
     case CameraFault::kNone:
     case CameraFault::kUnknown:
       return std::nullopt;
-    case CameraFault::kClock: {
-      PoseFinding finding{PoseMistake::kCameraClock};
-      finding.shift_s = found.clock_s;
-      finding.camera = static_cast<std::size_t>(found.camera);
-      return Warning{"camera-clocks",
-                     fmt::format("{}, as if its clock were {:.1f} ms {}; --set "
-                                 "rig.time_offsets_s={} fixes it",
-                                 beside, 1e3 * std::abs(found.clock_s),
-                                 found.clock_s < 0 ? "late" : "early", offsetsText(rig, finding))};
-    }
+    case CameraFault::kClock:
+      return Warning{
+          "camera-clocks",
+          fmt::format("{}, as if its clock were {:.1f} ms {}; --set "
+                      "rig.time_offsets_s={} fixes it",
+                      beside, 1e3 * std::abs(found.clock_s), found.clock_s < 0 ? "late" : "early",
+                      offsetsText(rig, static_cast<std::size_t>(found.camera), found.clock_s))};
     case CameraFault::kFocalLength:
       return Warning{
           "extrinsics",
@@ -83,11 +78,12 @@ std::optional<Warning> cameraWarning(const CameraComparison& found, const Rig& r
   }
   return Warning{
       "extrinsics",
-      fmt::format("{}, as if it were turned by {:.2f} degrees {}{}; {} of camera {} may be wrong, "
-                  "which look alike here: calibrate the cameras again, or give T_cn_cnm1 of {} "
+      fmt::format("{}, as if it were turned by {:.2f} degrees {}{}; extrinsics, principal point or "
+                  "lens of camera {} may be wrong, which look alike here: calibrate the cameras "
+                  "again, or give T_cn_cnm1 of {} "
                   "(--calibration), with which the maps fit",
                   beside, found.angle_rad / kRadiansPerDegree, axisText(found.fault), cost,
-                  kLooksAlike, found.camera, chainText(rig, found))};
+                  found.camera, chainText(rig, found))};
 }
 
 }  // namespace efm

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <initializer_list>
 #include <stdexcept>
 #include <utility>
 
@@ -81,16 +80,20 @@ void use(const CameraComparison& found, const Rig& rig, PoseVerdict& verdict) {
   }
 }
 
+/// Returns whether a mistake is one of a clock.
+bool isClock(const PoseFinding& finding) {
+  return finding.mistake == PoseMistake::kTimeShift || finding.mistake == PoseMistake::kCameraClock;
+}
+
 /// Returns whether a comparison of the cameras explains the events better than a mistake of a
 /// clock. The comparison sees offsets of some milliseconds, which the search for mistakes cannot.
 bool explainsMore(const std::vector<CameraComparison>& compared, const PoseFinding& finding) {
   constexpr double kSeenS = 0.05;  // larger offsets may hide from the comparison,
   constexpr double kFit = 0.6;     // and so may all if the maps do not fit
-  const bool is_clock = finding.mistake == PoseMistake::kCameraClock;
-  if (!is_clock && finding.mistake != PoseMistake::kTimeShift) return false;
+  const bool of_camera = finding.mistake == PoseMistake::kCameraClock;
   return std::any_of(compared.begin(), compared.end(), [&](const CameraComparison& found) {
     const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
-    return is_named || (is_clock && found.camera == static_cast<int>(*finding.camera) &&
+    return is_named || (of_camera && found.camera == static_cast<int>(*finding.camera) &&
                         found.correlation >= kFit && std::abs(finding.shift_s) < kSeenS);
   });
 }
@@ -100,16 +103,15 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
            PoseVerdict& verdict) {
   const PoseJudgement judgement = checkPoses(survey.rig, survey.samples, options);
   const PoseFinding* finding = judgement.finding ? &*judgement.finding : nullptr;
-  const auto isAny = [&](std::initializer_list<PoseMistake> mistakes) {
-    return std::count(mistakes.begin(), mistakes.end(), finding->mistake) > 0;
-  };
+  bool is_known = finding != nullptr && finding->mistake != PoseMistake::kUnknown;
   std::vector<CameraComparison> compared;
-  if (finding == nullptr ||
-      isAny({PoseMistake::kUnknown, PoseMistake::kTimeShift, PoseMistake::kCameraClock})) {
+  if (!is_known || isClock(*finding)) {
     compared = compareCameras(survey.rig, survey.samples, options);
   }
-  if (finding != nullptr && explainsMore(compared, *finding)) finding = nullptr;
-  const bool is_known = finding != nullptr && !isAny({PoseMistake::kUnknown});
+  if (is_known && isClock(*finding) && explainsMore(compared, *finding)) {
+    finding = nullptr;
+    is_known = false;
+  }
   QualityFacts& quality = verdict.quality;
   quality.unchecked = judgement.unchecked;
   for (const CameraComparison& found : compared) {

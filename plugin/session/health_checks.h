@@ -161,8 +161,8 @@ void dropExplainedBlur(std::vector<Warning>& warnings);
 Warning poseWarning(const PoseFinding& finding, const Rig& rig);
 
 /// Returns the offsets `rig.time_offsets_s` with which a clock is right: one value per camera.
-/// @param finding the shift, of all cameras or of one.
-std::string offsetsText(const Rig& rig, const PoseFinding& finding);
+/// @param camera the only one whose events are shifted; not given: all.
+std::string offsetsText(const Rig& rig, std::optional<std::size_t> camera, double shift_s);
 
 /// Returns the warning `extrinsics` or `camera-clocks` about two cameras, with the calibration with
 /// which they fit. @return std::nullopt if nothing is wrong, or if it is not known what.

@@ -49,6 +49,22 @@ double wrongBy(double expected) {
 
 double ratio(double part, double whole) { return whole > 0 ? part / whole : 0; }
 
+/// @param keyframes at least one.
+std::string badKeyframesText(const std::vector<std::size_t>& keyframes) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(kMostNamed, keyframes.size()); ++i) {
+    names += fmt::format("{}{}", i == 0 ? "" : ", ", keyframes[i] + 1);
+  }
+  if (keyframes.size() > kMostNamed) {
+    names += fmt::format(" and {} more", keyframes.size() - kMostNamed);
+  }
+  return fmt::format(
+      "keyframe{} {}: much worse than the others; a jump of the tracker? ([map] "
+      "min_keyframe_quality leaves such keyframes out)",
+      keyframes.size() > 1 ? "s" : "", names);
+}
+
 }  // namespace
 
 std::string_view nameOf(QualityWord word) { return nameIn(kWords, word); }
@@ -73,7 +89,6 @@ void QualityStatistics::add(const KeyframeDepthMap& keyframe, const QualityFacts
   }
   added.depths = static_cast<std::uint32_t>(depths_m.size());
   added.too_far = static_cast<float>(ratio(too_far, added.depths));
-  added.t_ref_ns = keyframe.window.t_ref_ns;
   added.wrong = static_cast<float>(ratio(wrong, known));
   if (!depths_m.empty()) {
     constexpr double kMedianOfSigma = 0.67;  // of a normal distribution
@@ -128,11 +143,11 @@ double QualityStatistics::usualHits() const {
   return hits.empty() ? 0 : upperMedian(hits);
 }
 
-double QualityStatistics::rightShareOf(std::size_t keyframe) const {
+double QualityStatistics::rightShareOf(std::size_t keyframe, double usual_hits) const {
   // A tracker's jump separates a keyframe from one neighbour; a wrong keyframe agrees with none.
   // Pixels that lie beside those of its neighbours agree by chance, but they are few.
   constexpr double kFewHits = 0.7;  // of the usual ones
-  const double usual = kFewHits * usualHits();
+  const double usual = kFewHits * usual_hits;
   double right = 0;
   bool compared = false;
   for (std::size_t i = keyframe; i <= keyframe + 1 && i < keyframes_.size(); ++i) {
@@ -153,6 +168,7 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
   MapQuality result;
   double depths = 0, wrong = 0, shared = 0, agreeing = 0, too_far = 0;
   std::vector<double> errors, parallaxes_px;
+  const double usual_hits = usualHits();
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     const Keyframe& keyframe = keyframes_[i];
     depths += keyframe.depths;
@@ -160,7 +176,7 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
     too_far += keyframe.depths * double{keyframe.too_far};
     shared += keyframe.before.points;
     agreeing += keyframe.before.agreeing;
-    result.keyframes.push_back(static_cast<float>(rightShareOf(i)));
+    result.keyframes.push_back(static_cast<float>(rightShareOf(i, usual_hits)));
     if (keyframe.depths == 0) continue;
     errors.push_back(keyframe.depth_error);
     parallaxes_px.push_back(keyframe.parallax_px);
@@ -198,7 +214,8 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
                     "share: the clock, the poses or the calibration may be wrong",
                     100 * *result.agreement));
   }
-  nameBadKeyframes(result);
+  findBadKeyframes(result);
+  if (!result.much_worse.empty()) reasons.push_back(badKeyframesText(result.much_worse));
   const double parallax_px = upperMedian(parallaxes_px);
   if (parallax_px < (agreeing < kConfirmed ? kAloneParallaxPx : kMinParallaxPx)) {
     reasons.push_back(
@@ -246,25 +263,14 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
   return result;
 }
 
-/// Names the keyframes that are much worse than the others.
-void QualityStatistics::nameBadKeyframes(MapQuality& quality) const {
+void QualityStatistics::findBadKeyframes(MapQuality& quality) const {
   constexpr float kMuchWorse = 0.6F;  // of the median
-  constexpr std::size_t kMostNamed = 5;
   if (keyframes_.size() < 3) return;
   std::vector<double> all(quality.keyframes.begin(), quality.keyframes.end());
   const auto least = kMuchWorse * static_cast<float>(upperMedian(all));
-  std::string names;
-  std::size_t count = 0;
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
-    if (quality.keyframes[i] >= least || keyframes_[i].depths == 0) continue;
-    if (++count <= kMostNamed) names += fmt::format("{}{}", names.empty() ? "" : ", ", i + 1);
+    if (quality.keyframes[i] < least && keyframes_[i].depths > 0) quality.much_worse.push_back(i);
   }
-  if (count == 0) return;
-  quality.reasons.push_back(
-      fmt::format("keyframe{} {}{}: much worse than the others; a jump of the tracker? ([map] "
-                  "min_keyframe_quality leaves such keyframes out)",
-                  count > 1 ? "s" : "", names,
-                  count > kMostNamed ? fmt::format(" and {} more", count - kMostNamed) : ""));
 }
 
 std::string textOf(const MapQuality& quality) {

@@ -35,6 +35,7 @@ struct MapQuality {
   std::vector<std::string> reasons;  ///< Why the word is not better; and what would help.
   /// Predicted fraction of the depths of each keyframe that are right.
   std::vector<float> keyframes;
+  std::vector<std::size_t> much_worse;  ///< Keyframes that are much worse than the others, from 0.
   std::size_t left_out = 0;  ///< Keyframes without points in the map: `min_keyframe_quality`.
 };
 
@@ -60,7 +61,7 @@ class QualityStatistics {
   void add(const KeyframeDepthMap& keyframe, const QualityFacts& facts);
   /// Returns the predicted fraction of right depths of a keyframe, from it and the keyframes before
   /// and after it that were added.
-  double rightShareOf(std::size_t keyframe) const;
+  double rightShareOf(std::size_t keyframe) const { return rightShareOf(keyframe, usualHits()); }
   std::size_t keyframes() const { return keyframes_.size(); }
 
   /// @param planes of the map. @param num_cameras number of cameras that took part.
@@ -80,11 +81,11 @@ class QualityStatistics {
     float depth_error = 0;  // median, by the variance
     float parallax_px = 0;  // at the median depth
     float too_far = 0;      // fraction beyond QualityFacts::sure_depth_m
-    std::int64_t t_ref_ns = 0;
     Shared before;
   };
-  void nameBadKeyframes(MapQuality& quality) const;
+  void findBadKeyframes(MapQuality& quality) const;
   double usualHits() const;
+  double rightShareOf(std::size_t keyframe, double usual_hits) const;
   Shared sharedWithLast(const KeyframeDepthMap& keyframe) const;
 
   std::vector<Keyframe> keyframes_;

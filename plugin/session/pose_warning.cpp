@@ -11,11 +11,11 @@
 
 namespace efm {
 
-std::string offsetsText(const Rig& rig, const PoseFinding& finding) {
+std::string offsetsText(const Rig& rig, std::optional<std::size_t> camera, double shift_s) {
   std::string text;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const double shift_s = finding.camera.value_or(c) == c ? finding.shift_s : 0;
-    const double offset_s = secondsBetween(0, rig.cameras[c].time_offset_ns) + shift_s;
+    const double offset_s =
+        secondsBetween(0, rig.cameras[c].time_offset_ns) + (camera.value_or(c) == c ? shift_s : 0);
     text += (text.empty() ? "" : ",") + fmt::format("{:.3f}", offset_s);
   }
   return text;
@@ -106,14 +106,14 @@ std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
     case PoseMistake::kTimeShift:
       return fmt::format("with the poses {:.3f} s {}; --set rig.time_offsets_s={} fixes it{}",
                          std::abs(finding.shift_s), finding.shift_s < 0 ? "later" : "earlier",
-                         offsetsText(rig, finding),
+                         offsetsText(rig, finding.camera, finding.shift_s),
                          rig.cameras.size() > 1 ? "" : ", to some 30 ms: one camera tells no more");
     case PoseMistake::kCameraClock:
       return fmt::format(
           "with the events of camera {} {:.3f} s {}, as its clock differs from that "
           "of camera 0; --set rig.time_offsets_s={} fixes it",
           *finding.camera, std::abs(finding.shift_s), finding.shift_s < 0 ? "earlier" : "later",
-          offsetsText(rig, finding));
+          offsetsText(rig, finding.camera, finding.shift_s));
     case PoseMistake::kMirrored:
       return "with " + mirrorText(finding.pixels);
     case PoseMistake::kPixels:

@@ -175,6 +175,7 @@ Json asJson(const MapQuality& quality) {
   for (const float right : quality.keyframes) {
     json["keyframes"].push_back(std::round(1000 * double{right}) / 1000);
   }
+  json["much_worse"] = quality.much_worse;
   return json;
 }
 

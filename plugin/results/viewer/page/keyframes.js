@@ -22,9 +22,8 @@ function frustumLines(number) {
 }
 const lastShown = () => Math.min(shown.time, keyframes.length - 1);
 /// Whether a keyframe is much worse than the others, by the report.
-const keyframeQuality = report.quality ? report.quality.keyframes : [];
-const leastQuality = 0.6 * ([...keyframeQuality].sort((a, b) => a - b)[keyframeQuality.length >> 1] || 0);
-const isBad = number => keyframeQuality[number] < leastQuality;
+const muchWorse = new Set(report.quality && report.quality.much_worse);
+const isBad = number => muchWorse.has(number);
 const hasFrustum = number => number % frustumStride === 0;
 
 let lineCache = {};
