@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 
 #include <algorithm>
+#include <mutex>
 #include <stdexcept>
 
 namespace efm {
@@ -256,33 +257,66 @@ LensInverse::Distorted LensInverse::distort(const Eigen::Vector2d& ray) const {
   return result;
 }
 
-UndistortionTable::UndistortionTable(const CameraModel& model)
-    : width_(model.width), height_(model.height) {
+namespace {
+
+using Rays = std::vector<Eigen::Vector2f>;
+
+Rays raysThrough(const CameraModel& model) {
   const LensInverse lens(model);
-  rays_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  tbb::parallel_for(0, height_, [&](int y) {
-    const auto row = rays_.begin() + static_cast<std::ptrdiff_t>(y) * width_;
+  Rays rays(static_cast<std::size_t>(model.width) * static_cast<std::size_t>(model.height));
+  tbb::parallel_for(0, model.height, [&](int y) {
+    const auto row = rays.begin() + static_cast<std::ptrdiff_t>(y) * model.width;
     Eigen::Vector2d before = LensInverse::noRay();
     Eigen::Vector2d last = before;
-    for (int x = 0; x < width_; ++x) {
+    for (int x = 0; x < model.width; ++x) {
       const Eigen::Vector2d ray = lens.rayThrough(x, y, 2 * last - before);
       row[x] = ray.cast<float>();
       before = last;
       last = ray;
     }
   });
+  return rays;
+}
+
+/// Returns the rays of a lens: those of a table that exists, if there is one.
+std::shared_ptr<const Rays> sharedRays(const CameraModel& model) {
+  struct Lens {
+    CameraModel model;
+    std::weak_ptr<const Rays> rays;
+  };
+  static std::mutex mutex;
+  static std::vector<Lens> lenses;
+  {
+    const std::lock_guard lock(mutex);
+    for (const Lens& lens : lenses) {
+      if (auto rays = lens.rays.lock(); rays && lens.model == model) return rays;
+    }
+  }
+  // Without the lock: while a thread waits for the rows, it may make another table.
+  auto rays = std::make_shared<const Rays>(raysThrough(model));
+  const std::lock_guard lock(mutex);
+  const auto is_gone = [](const Lens& lens) { return lens.rays.expired(); };
+  lenses.erase(std::remove_if(lenses.begin(), lenses.end(), is_gone), lenses.end());
+  lenses.push_back({model, rays});
+  return rays;
+}
+
+}  // namespace
+
+UndistortionTable::UndistortionTable(const CameraModel& model)
+    : width_(model.width), height_(model.height), rays_(sharedRays(model)) {
   center_x_ = static_cast<int>(std::clamp(model.cx, 0.0, width_ - 1.0));
   center_y_ = static_cast<int>(std::clamp(model.cy, 0.0, height_ - 1.0));
   if (hasRay(center_x_, center_y_)) return;
-  const auto seen = std::find_if(rays_.begin(), rays_.end(),
+  const auto seen = std::find_if(rays_->begin(), rays_->end(),
                                  [](const Eigen::Vector2f& ray) { return !std::isnan(ray.x()); });
-  if (seen == rays_.end()) {
+  if (seen == rays_->end()) {
     throw std::invalid_argument(
         "the lens: no pixel of the sensor has a viewing ray by its distortion coefficients and "
         "principal point");
   }
-  center_x_ = static_cast<int>((seen - rays_.begin()) % width_);
-  center_y_ = static_cast<int>((seen - rays_.begin()) / width_);
+  center_x_ = static_cast<int>((seen - rays_->begin()) % width_);
+  center_y_ = static_cast<int>((seen - rays_->begin()) / width_);
 }
 
 Eigen::Vector2d UndistortionTable::rayNear(int x, int y) const {
@@ -296,8 +330,8 @@ Eigen::Vector2d UndistortionTable::rayNear(int x, int y) const {
 }
 
 std::vector<bool> UndistortionTable::outsideLens() const {
-  std::vector<bool> outside(rays_.size());
-  std::transform(rays_.begin(), rays_.end(), outside.begin(),
+  std::vector<bool> outside(rays_->size());
+  std::transform(rays_->begin(), rays_->end(), outside.begin(),
                  [](const Eigen::Vector2f& ray) { return std::isnan(ray.x()); });
   if (std::find(outside.begin(), outside.end(), true) == outside.end()) outside.clear();
   return outside;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "mapping/geometry/rig.h"
@@ -99,7 +100,8 @@ class LensInverse {
   double surely_on_branch_ = 0;  // rays up to this length are on it, in any direction
 };
 
-/// The viewing ray of every pixel of one camera: computed once, then looked up per event.
+/// The viewing ray of every pixel of one camera: computed once, then looked up per event. Tables of
+/// the same lens share their rays: as long as one table exists, further ones cost nothing.
 ///
 /// Rays are stored as floats: a look-up is a random access to memory, and the smaller table fits
 /// the caches better. The relative rounding error of a ray is at most 2^-25: 2e-5 pixels at the
@@ -117,7 +119,7 @@ class UndistortionTable {
   /// NaN if the pixel lies outside the lens (`LensInverse`).
   Eigen::Vector2d ray(int x, int y) const {
     const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
-    return rays_[row + static_cast<std::size_t>(x)].cast<double>();
+    return (*rays_)[row + static_cast<std::size_t>(x)].cast<double>();
   }
   bool hasRay(int x, int y) const { return !std::isnan(ray(x, y).x()); }
   /// Returns the ray of pixel (x, y), or else the ray of the next pixel with a ray, on the line
@@ -126,14 +128,14 @@ class UndistortionTable {
   /// Returns for each pixel, row-major, whether it lies outside the lens. Empty if no pixel does.
   std::vector<bool> outsideLens() const;
   /// Returns the rays of all pixels, row-major: pixel (x, y) has element y * width() + x.
-  const Eigen::Vector2f* rays() const { return rays_.data(); }
+  const Eigen::Vector2f* rays() const { return rays_->data(); }
 
  private:
   int width_ = 0;
   int height_ = 0;
   int center_x_ = 0;  // this pixel has a ray
   int center_y_ = 0;
-  std::vector<Eigen::Vector2f> rays_;  // row-major
+  std::shared_ptr<const std::vector<Eigen::Vector2f>> rays_;  // row-major
 };
 
 }  // namespace efm

@@ -61,9 +61,8 @@ int FusionMapper::addCamera(const RigCamera& camera) {
   std::vector<bool> outside_lens;
   if (takes_part) {
     ThreadArena arena(options_.keyframe.sweep.threadsOrCores());
-    const auto& [at, is_new] =
-        arena.execute([&] { return undistortion_.emplace(index, camera.model); });
-    outside_lens = at->second.outsideLens();
+    arena.execute([&] { undistortion_.emplace_back(camera.model); });
+    outside_lens = undistortion_.back().outsideLens();
   }
   rig_.cameras.push_back(camera);
   cameras_.emplace_back(index, camera, takes_part, std::move(outside_lens), options_.filter);
@@ -337,12 +336,8 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
 
 KeyframeMapper& FusionMapper::keyframeMapper() const {
   if (!mapper_) {
-    const std::vector<int> cameras = selectedCameras(rig_, options_.cameras);
-    std::vector<UndistortionTable> tables;
-    for (const int camera : cameras) {
-      if (auto table = undistortion_.extract(camera)) tables.push_back(std::move(table.mapped()));
-    }
-    mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe, std::move(tables));
+    mapper_ = std::make_unique<KeyframeMapper>(rig_, selectedCameras(rig_, options_.cameras),
+                                               options_.keyframe);
   }
   return *mapper_;
 }

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -143,6 +142,8 @@ class FusionMapper : private RecordingProgress {
   /// Returns the counts, complete once `finish` was called and `next` returned std::nullopt.
   MapperCounts counts() const;
   const Rig& rig() const { return rig_; }
+  /// Returns the viewing rays of the selected cameras.
+  const std::vector<UndistortionTable>& undistortion() const { return undistortion_; }
   const Trajectory& trajectory() const { return trajectory_; }
 
  private:
@@ -175,7 +176,7 @@ class FusionMapper : private RecordingProgress {
 
   FusionMapperOptions options_;
   Rig rig_;
-  mutable std::map<int, UndistortionTable> undistortion_;  // of selected cameras; moved to mapper_
+  std::vector<UndistortionTable> undistortion_;  // of selected cameras: mapper_ shares their rays
   Trajectory trajectory_;
   std::unique_ptr<KeyframePolicy> policy_;
   mutable std::unique_ptr<KeyframeMapper> mapper_;  // made when first needed: the rig is complete

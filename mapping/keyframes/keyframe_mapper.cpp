@@ -141,14 +141,12 @@ void KeyframeMapperOptions::validate() const {
 }
 
 KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
-                               const KeyframeMapperOptions& options,
-                               std::vector<UndistortionTable> undistortion)
+                               const KeyframeMapperOptions& options)
     : rig_(std::move(rig)),
       selected_(std::move(selected)),
       options_(options),
       planes_(options.planes),
-      groups_(options.split, options.subintervals),
-      undistortion_(std::move(undistortion)) {
+      groups_(options.split, options.subintervals) {
   options_.validate();
   if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
@@ -159,8 +157,6 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
     requireCamera(rig_, camera, "cameras");
     cameraOf(camera).validate();
   }
-  if (undistortion_.size() == selected_.size()) return;
-  undistortion_.clear();
   ThreadArena arena(options_.sweep.threadsOrCores());
   arena.execute([&] {
     for (const int camera : selected_) undistortion_.emplace_back(cameraOf(camera).model);

@@ -126,9 +126,7 @@ struct KeyframeMapperOptions {
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
-  /// @param undistortion of the selected cameras, in their order, if they are known already.
-  KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options,
-                 std::vector<UndistortionTable> undistortion = {});
+  KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options);
 
   /// @param events of the window, per camera of the rig, in time order, on the trajectory's clock.
   /// @return std::nullopt if the reference time has no pose.

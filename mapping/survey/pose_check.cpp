@@ -118,7 +118,10 @@ class PoseCheck {
     compareClocks();
     compareAreas();
     compareMirrors();
-    return judgement();
+    PoseJudgement result = judgement();
+    best_other_ = std::max(best_other_, best_wrong_);
+    if (best_other_ > 0) result.sharpness = 1 / best_other_;
+    return result;
   }
   /// Returns the time from the first to the last event of all pieces.
   double seenS() const {
@@ -247,13 +250,16 @@ class PoseCheck {
     for (const double beside_s : {best_s - kClockS, best_s + kClockS}) {
       const Gains beside = gainsOf(beside_s);
       open = open || beside.logs.empty();
-      if (!beside.logs.empty()) drop = std::min(drop, 1 - beside.mean() / candidate.gains.mean());
+      if (beside.logs.empty()) continue;
+      drop = std::min(drop, 1 - beside.mean() / candidate.gains.mean());
+      best_other_ = std::max(best_other_, beside.mean());
     }
     candidate.is_peak = drop > 2 * kMinDrop && ((!open && seenS() >= kMinSeenOfOneS) ||
                                                 candidate.gains.mean() > kMinShortShiftGain);
     clock_is_known_ = !open && drop > kMinDrop && std::abs(best_s) < kKnownClockS;
     if (candidate.gains.logs.empty()) candidate.gains = gainsOfShift(best_s, half());
     best_shift_gain_ = candidate.gains.mean();
+    if (std::abs(best_s) >= kMinShiftS) best_other_ = std::max(best_other_, best_shift_gain_);
     candidates_.push_back(std::move(candidate));
   }
 
@@ -490,6 +496,7 @@ class PoseCheck {
   double typical_wrong_ = 0;  // the median gain of the hypotheses: at most one is right
   double best_wrong_ = 0;
   double best_shift_gain_ = 1;
+  double best_other_ = 0;  // gain of an alternative that is not the poses as they are
   bool clock_is_known_ = false;
   bool area_is_known_ = true;
 };

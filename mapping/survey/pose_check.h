@@ -73,6 +73,9 @@ struct PoseJudgement {
   std::optional<PoseFinding> finding;
   /// Without a finding: what could not be checked, and why; empty if the poses are right.
   std::string unchecked{};
+  /// Sharpness of the events with the poses as they are, relative to the sharpest alternative:
+  /// other axes, an inverse, or clocks at least 5 ms apart. std::nullopt if none was compared.
+  std::optional<double> sharpness{};
 };
 
 /// Compares the sharpness of the samples' events with the poses as they are, and with each mistake

@@ -114,6 +114,7 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   }
   QualityFacts& quality = verdict.quality;
   quality.unchecked = judgement.unchecked;
+  quality.sharpness = judgement.sharpness;
   for (const CameraComparison& found : compared) {
     if (!is_known) use(found, survey.rig, verdict);
   }
@@ -319,8 +320,8 @@ RecordingSurvey FirstLook::finish() {
     }
   } catch (const std::exception&) {  // the pass that maps reports it
   }
-  RecordingSurvey result{mapper_.rig(), samples_.take(), std::nullopt, most_events_per_s_,
-                         lever_m_};
+  RecordingSurvey result{mapper_.rig(),      samples_.take(), std::nullopt,
+                         most_events_per_s_, lever_m_,        mapper_.undistortion()};
   if (const std::uint64_t chosen = mapper_.readEvents()) {
     result.most_events_per_s *= static_cast<double>(received_) / static_cast<double>(chosen);
   }

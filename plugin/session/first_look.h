@@ -43,6 +43,7 @@ struct RecordingSurvey {
   /// Highest event rate of a window, all cameras together.
   double most_events_per_s = 0;
   double lever_m = 0;  ///< Longest lever arm from the tracked body to the rig.
+  std::vector<UndistortionTable> undistortion;  ///< All sweeps of the samples share them.
 
   /// Judges whether the poses explain the events, and how much the depths depend on the poses.
   /// Errors are left to the pass that maps.

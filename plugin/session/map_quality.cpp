@@ -186,36 +186,43 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
   if (compared) result.agreement = agreeing / shared;
   result.support = keyframes_.size() > 1 ? shared / depths : 0;
   result.depth_error = upperMedian(errors);
+  result.sharpness = facts.sharpness;
 
   // What makes depths wrong, one beside the other.
-  const double by_probability = wrongBy(wrong / depths);
-  const double by_agreement = compared ? std::max(0.0, kUsualAgreement - *result.agreement) : 0;
-  const double by_support =
-      keyframes_.size() > 1 ? kWrongPerSupport * std::max(0.0, kUsualSupport - result.support) : 0;
-  const double by_motion =
-      facts.motion_agreement
-          ? kWrongPerMotion * std::max(0.0, kUsualMotion - *facts.motion_agreement)
-          : 0;
-  const double by_cameras = 1 - (1 - too_far / depths) * (1 - facts.wrong_by_cameras);
   double right = 1;
-  for (const double part : {by_probability, by_agreement, by_support, by_motion, by_cameras}) {
-    right *= 1 - part;
-  }
-  if (!facts.mistake.empty()) right *= 1 - kWrongByMistake;
-  if (!facts.unchecked.empty()) right *= 1 - kWrongIfUnchecked;
-  if (num_cameras < 2) right *= 1 - kWrongOfOne;
-  result.wrong_share = 1 - right;
-
   std::vector<std::string>& reasons = result.reasons;
-  if (!facts.mistake.empty()) reasons.push_back("see the warning " + facts.mistake);
-  if (by_agreement > kWorthSaying) {
-    reasons.push_back(
-        fmt::format("keyframes in a row agree within 10 % in {:.0f} % of the points that they "
-                    "share: the clock, the poses or the calibration may be wrong",
-                    100 * *result.agreement));
+  const auto take = [&](double wrong_share, const std::string& reason) {
+    right *= 1 - std::max(0.0, wrong_share);
+    if (wrong_share > kWorthSaying) reasons.push_back(reason);
+  };
+  if (!facts.mistake.empty()) take(kWrongByMistake, "see the warning " + facts.mistake);
+  if (compared) {
+    take(kUsualAgreement - *result.agreement,
+         fmt::format("keyframes in a row agree within 10 % in {:.0f} % of the points that they "
+                     "share: the clock, the poses or the calibration may be wrong",
+                     100 * *result.agreement));
   }
   findBadKeyframes(result);
   if (!result.much_worse.empty()) reasons.push_back(badKeyframesText(result.much_worse));
+  take(wrongBy(wrong / depths), "many depths are not sure by themselves");
+  if (keyframes_.size() > 1) {
+    take(kWrongPerSupport * (kUsualSupport - result.support),
+         fmt::format("{:.0f} % of the depths are in two keyframes", 100 * result.support));
+  }
+  if (facts.motion_agreement) {
+    take(kWrongPerMotion * (kUsualMotion - *facts.motion_agreement),
+         fmt::format("the depths by all cameras and those by the motion of one agree in {:.0f} %",
+                     100 * *facts.motion_agreement));
+  }
+  const double by_cameras = 1 - (1 - too_far / depths) * (1 - facts.wrong_by_cameras);
+  take(by_cameras, fmt::format("the maps of single cameras lie beside each other: the calibration "
+                               "between cameras makes {:.0f} % of the depths wrong",
+                               100 * by_cameras));
+  const bool is_alone = num_cameras < 2;
+  if (!facts.unchecked.empty()) take(kWrongIfUnchecked, "");
+  if (is_alone) take(kWrongOfOne, "");
+  result.wrong_share = 1 - right;
+
   const double parallax_px = upperMedian(parallaxes_px);
   if (parallax_px < (agreeing < kConfirmed ? kAloneParallaxPx : kMinParallaxPx)) {
     reasons.push_back(
@@ -231,25 +238,8 @@ MapQuality QualityStatistics::quality(const QualityFacts& facts, const DepthPlan
         100 * at_nearest, planes.min_depth_m, 100 * at_farthest, planes.max_depth_m));
   }
   if (depths < kFewDepths) reasons.push_back(fmt::format("there are {:.0f} depths", depths));
-  if (by_probability > kWorthSaying) reasons.push_back("many depths are not sure by themselves");
-  if (by_support > kWorthSaying) {
-    reasons.push_back(
-        fmt::format("{:.0f} % of the depths are in two keyframes", 100 * result.support));
-  }
-  if (by_motion > kWorthSaying) {
-    reasons.push_back(
-        fmt::format("the depths by all cameras and those by the motion of one agree in {:.0f} %",
-                    100 * *facts.motion_agreement));
-  }
-  if (by_cameras > kWorthSaying) {
-    reasons.push_back(fmt::format(
-        "the maps of single cameras lie beside each other: the calibration between cameras makes "
-        "{:.0f} % of the depths wrong",
-        100 * by_cameras));
-  }
   reasons.insert(reasons.end(), facts.doubts.begin(), facts.doubts.end());
   if (!facts.unchecked.empty()) reasons.push_back(facts.unchecked);
-  const bool is_alone = num_cameras < 2;
   if (is_alone && !compared) reasons.push_back("no second keyframe has the same points");
   if (!facts.unchecked.empty() || (is_alone && !compared)) {
     reasons.push_back(is_alone ? "a second camera, 1.5 s or more, or motion sideways would help"
@@ -281,6 +271,10 @@ std::string textOf(const MapQuality& quality) {
     if (quality.agreement) {
       text += fmt::format("; {:.0f} % are in two keyframes, which agree in {:.0f} %",
                           100 * quality.support, 100 * *quality.agreement);
+    }
+    if (quality.sharpness) {
+      text += fmt::format("; the events are {:.2f} times as sharp as with other clocks or axes",
+                          *quality.sharpness);
     }
   }
   if (quality.left_out > 0) {

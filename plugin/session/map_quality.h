@@ -32,6 +32,7 @@ struct MapQuality {
   double support = 0;
   /// Fraction of these depths that agree within 10 %; std::nullopt: there are too few.
   std::optional<double> agreement;
+  std::optional<double> sharpness;   ///< See PoseJudgement.
   std::vector<std::string> reasons;  ///< Why the word is not better; and what would help.
   /// Predicted fraction of the depths of each keyframe that are right.
   std::vector<float> keyframes;
@@ -44,6 +45,7 @@ struct QualityFacts {
   std::vector<std::string> doubts;  ///< Reasons to doubt any map of it.
   std::string unchecked;            ///< What of the poses could not be checked, and why.
   std::string mistake;              ///< Name of a warning that makes any map wrong; or empty.
+  std::optional<double> sharpness;  ///< See PoseJudgement.
   /// Fraction of the depths by the motion of one camera that agree with those by all cameras.
   std::optional<double> motion_agreement;
   double sure_depth_m = std::numeric_limits<double>::infinity();  ///< See CameraComparison.

@@ -207,6 +207,10 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
         warning.name == "voxel-size")
       warn(warning.name + ": " + warning.text, error);
   }
+  const MapQuality quality = status().quality;
+  if (!callbacks_.info || quality.word == QualityWord::kUnknown) return;
+  callBack(error, "the callback of the log",
+           [&] { callbacks_.info("quality: " + textOf(quality)); });
 }
 
 void MapperCore::add(Sample sample) {

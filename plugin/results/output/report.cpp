@@ -168,6 +168,7 @@ Json asJson(const MapQuality& quality) {
     json["depth_error"] = quality.depth_error;
     json["support"] = quality.support;
     if (quality.agreement) json["agreement"] = *quality.agreement;
+    if (quality.sharpness) json["sharpness"] = *quality.sharpness;
   }
   json["left_out"] = quality.left_out;
   json["reasons"] = quality.reasons;

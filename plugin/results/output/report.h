@@ -98,10 +98,10 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// each camera's events before the mapping; windows_given_up and the reasons; late_events,
 /// pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each with name and
 /// text), notes (the same; absent if there are none), quality (see MapQuality: word, wrong_share,
-/// depth_error, support, agreement if known, left_out, reasons, keyframes, much_worse), recording (the files), perturbation
-/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason),
-/// options (all options with the used values) and version. Bytes of names that are not UTF-8 become
-/// U+FFFD.
+/// depth_error, support, agreement and sharpness if known, left_out, reasons, keyframes,
+/// much_worse), recording (the files), perturbation (the faults of the poses, if any), chosen (the
+/// automatic options: key, value and reason), options (all options with the used values) and
+/// version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// Return lists of objects with the keys of the report: key, value and reason; name and text.

@@ -17,6 +17,21 @@ function showNumbers() {
     `${plural(report.keyframes, "keyframe")}, ${plural(map.all_points, "point")}` +
     (most ? `, ${size.replaceAll(" ", kNoBreak)}` : "");
 
+  const quality = report.quality || {word: "unknown", reasons: []};
+  const percent = (value, digits) => `${(100 * value).toFixed(digits)} %`;
+  if (quality.wrong_share !== undefined) {
+    addRow("report", "quality", `${quality.word}: ${percent(quality.wrong_share, 0)} of the depths wrong by estimate, ` +
+      `median error ${percent(quality.depth_error, 1)}`);
+  }
+  if (quality.agreement !== undefined) {
+    addRow("report", "support", `${percent(quality.support, 0)} of the depths are in two keyframes, which agree in ` +
+      percent(quality.agreement, 0));
+  }
+  if (quality.sharpness !== undefined) {
+    addRow("report", "sharpness", `${quality.sharpness.toFixed(2)} times that with other clocks or axes of the poses`);
+  }
+  for (const reason of quality.reasons) addRow("report", "why", reason);
+
   const events = report.events, seconds = value => `${number(value)} s`;
   const part = value => `${(100 * value / events.read).toFixed(1)} %`;
   const left = [["without_pose", "without a pose"], ["outside_window", "outside the keyframes' windows"],
@@ -50,18 +65,7 @@ function showNumbers() {
   }
   addRow("report", "version", report.version);
 
-  const quality = report.quality || {word: "unknown", reasons: []};
-  const percent = (value, digits) => `${(100 * value).toFixed(digits)} %`;
-  if (quality.wrong_share !== undefined) {
-    addRow("report", "quality", `${quality.word}: ${percent(quality.wrong_share, 0)} of the depths wrong by estimate, ` +
-      `median error ${percent(quality.depth_error, 1)}`);
-  }
-  if (quality.agreement !== undefined) {
-    addRow("report", "support", `${percent(quality.support, 0)} of the depths are in two keyframes, which agree in ` +
-      percent(quality.agreement, 0));
-  }
-  const doubts = quality.reasons.map((text) => ({ name: quality.word, text }));
-  for (const [kind, texts] of [["warning", doubts.concat(report.warnings)], ["note", report.notes || []]]) {
+  for (const [kind, texts] of [["warning", report.warnings], ["note", report.notes || []]]) {
     element(`${kind}-section`).hidden = texts.length === 0;
     for (const {name, text} of texts) {
       for (const [tag, words] of [["dt", name], ["dd", text]]) {
