@@ -13,6 +13,7 @@
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/survey/depth_agreement.h"
 
 namespace efm {
 namespace {
@@ -26,6 +27,9 @@ constexpr double kWindowS = 0.2;
 constexpr std::size_t kMinWindows = 3;
 constexpr double kMinComparedS = 0.5;
 constexpr double kMinBaselineM = 1e-3;
+/// With less parallax by the baseline, either no depth depends on the two cameras, or the poses
+/// have another unit, and the maps lie at wrong places.
+constexpr double kMinBaselinePx = 1;
 constexpr double kMinProbability = 0.8;  // of the depths that are compared
 /// Points beyond the farthest plane would be moved along the epipolar lines.
 constexpr double kFarther = 4;  // than the map's farthest plane
@@ -131,6 +135,7 @@ struct Sums {
       yy += y * y;
     }
   }
+  double correlation() const { return xy / std::sqrt(xx * yy + 1e-12); }
 };
 
 struct Fit {
@@ -152,17 +157,10 @@ Fit fit(const Pairs& pairs, int free, bool with_baseline, Parameters start, std:
   sigmas << 1e3, 1e3, 1e3, 4, 1, 10;
   const Parameters prior = sigmas.cwiseAbs2().cwiseInverse();
   Fit result{start};
-  std::vector<double> baselines(pairs.size(), 0.0);
+  std::vector<double> baselines(pairs.size(), start[kBaseline]);
   double count = 0;
   for (const MapPair* pair : pairs) count += static_cast<double>(pair->pixels.size());
   const double weight = kIndependentPixels / std::max(1.0, count);
-  const auto sumsOf = [&](std::size_t i, std::size_t at) {
-    Parameters now = result.value;
-    now[kBaseline] = baselines[i];
-    Sums sums;
-    sums.add(*pairs[i], at, now);
-    return sums;
-  };
   for (; scale < kScalesPx.size(); ++scale) {
     for (int step = 0; step < kSteps; ++step) {
       Information left = prior.asDiagonal();
@@ -173,15 +171,19 @@ Fit fit(const Pairs& pairs, int free, bool with_baseline, Parameters start, std:
       };
       std::vector<Own> own;
       for (std::size_t i = 0; i < pairs.size(); ++i) {
-        const Sums sums = sumsOf(i, scale);
+        Parameters now = result.value;
+        now[kBaseline] = baselines[i];
+        Sums sums;
+        sums.add(*pairs[i], scale, now);
         left += weight * sums.information;
         right += weight * sums.gradient;
         if (!with_baseline) continue;
         // The window's own baseline is eliminated.
-        const Own& of = own.emplace_back(
-            Own{weight * sums.information.col(kBaseline),
-                weight * sums.information(kBaseline, kBaseline) + prior[kBaseline],
-                weight * sums.gradient[kBaseline] - prior[kBaseline] * baselines[i]});
+        const Own& of =
+            own.emplace_back(Own{weight * sums.information.col(kBaseline),
+                                 weight * sums.information(kBaseline, kBaseline) + prior[kBaseline],
+                                 weight * sums.gradient[kBaseline] -
+                                     prior[kBaseline] * (baselines[i] - start[kBaseline])});
         left -= of.row * of.row.transpose() / of.information;
         right -= of.row * (of.gradient / of.information);
       }
@@ -194,13 +196,12 @@ Fit fit(const Pairs& pairs, int free, bool with_baseline, Parameters start, std:
   }
   Sums all;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Sums sums = sumsOf(i, kScalesPx.size() - 1);
-    all.xy += sums.xy;
-    all.xx += sums.xx;
-    all.yy += sums.yy;
+    Parameters now = result.value;
+    now[kBaseline] = baselines[i];
+    all.add(*pairs[i], kScalesPx.size() - 1, now);
     result.baseline_rms += baselines[i] * baselines[i] / static_cast<double>(pairs.size());
   }
-  result.correlation = all.xy / std::sqrt(all.xx * all.yy + 1e-12);
+  result.correlation = all.correlation();
   result.baseline_rms = std::sqrt(result.baseline_rms);
   return result;
 }
@@ -300,9 +301,12 @@ class CameraFit {
   void judge(double scale, CameraComparison& result) const {
     Pairs all;
     for (const MapPair& pair : pairs_) all.push_back(&pair);
+    if (scale * 100 * shiftBy(Parameters::Unit(kBaseline)) < kMinBaselinePx) return;
     const Fit turned = fit(all, kClock, false, Parameters::Zero(), 0);
     const Fit timed = fit(all, kClock + 1, false, turned.value, 1);
     const Fit whole = fit(all, kClock + 1, true, timed.value, 1);
+    result.scale = otherScale(all, whole);
+    if (result.scale != 1) return;
     const Fit zoomed = fit(all, kZoom + 1, true, whole.value, 1);
     // Two fits must agree, which differ in what else may explain the distance of the maps.
     const auto sure = [](double a, double b) {
@@ -339,6 +343,25 @@ class CameraFit {
   }
 
  private:
+  /// Returns the distance of the cameras, relative to the given one, with which the maps fit better
+  /// than after a fit; 1 if there is none. Positions of the poses in another unit or scale look so.
+  static double otherScale(const Pairs& all, const Fit& whole) {
+    Parameters best = Parameters::Zero();
+    double best_correlation = 0;
+    for (const double factor : {1.0, 0.7, 0.5, 0.3, 0.1, 0.01, 1.4, 2.0, 3.0, 10.0, 100.0}) {
+      const Parameters start = 100 * (factor - 1) * Parameters::Unit(kBaseline);
+      Sums sums;
+      for (const MapPair* pair : all) sums.add(*pair, 0, start);
+      if (sums.correlation() <= best_correlation) continue;
+      best_correlation = sums.correlation();
+      best = start;
+    }
+    if (best.isZero()) return 1;
+    const Fit scaled = fit(all, kClock, true, best, 0);
+    if (scaled.correlation <= whole.correlation) return 1;
+    return 1 + 0.01 * std::copysign(scaled.baseline_rms, best[kBaseline]);
+  }
+
   /// Returns the standard errors of a fit, from the fits without one window each (jackknife).
   static Parameters errorsOf(const Pairs& all, const Fit& whole) {
     std::vector<Parameters> without;
@@ -471,6 +494,31 @@ std::vector<CameraComparison> compareCameras(const Rig& rig,
     fit.judge(scale, comparison);
   }
   return comparisons;
+}
+
+double sharpnessGain(const CameraComparison& found, double travel, Rig rig,
+                     const std::vector<WindowSample>& samples, const FusionMapperOptions& options) {
+  const Rig given = rig;
+  const auto camera = static_cast<std::size_t>(found.camera);
+  RigCamera& fitted = rig.cameras[camera];
+  fitted.T_rig_cam = fitted.T_rig_cam * Rigid3{found.R_cam_fitted, Eigen::Vector3d::Zero()};
+  fitted.model.fx *= found.zoom;
+  fitted.model.fy *= found.zoom;
+  EventSharpness before(given, options);
+  EventSharpness after(rig, options);
+  double sum = 0;
+  auto pieces = piecesOf(samples, options.trajectory);
+  for (SamplePiece& piece : pieces) {
+    const double as_given = before.of(piece, piece.trajectory);
+    for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(found.clock_s);
+    Trajectory scaled(options.trajectory);
+    for (const auto& [t_ns, pose] : piece.trajectory.poses()) {
+      scaled.add({t_ns, {pose.rotation, travel * pose.translation}});
+    }
+    const double as_fitted = after.of(piece, scaled);
+    if (as_given > 0 && as_fitted > 0) sum += std::log(as_fitted / as_given);
+  }
+  return pieces.empty() ? 1 : std::exp(sum / static_cast<double>(pieces.size()));
 }
 
 }  // namespace efm

@@ -36,6 +36,8 @@ struct CameraComparison {
   Eigen::Quaterniond R_cam_fitted = Eigen::Quaterniond::Identity();  ///< Rotation of the camera.
   double clock_s = 0;  ///< `kClock`: seconds to add to the times of the camera's events.
   double zoom = 1;     ///< `kFocalLength`: factor of the focal length.
+  /// Factor of the poses' positions. Not 1: it, and no fault of the camera, explains the maps.
+  double scale = 1;
   /// Depths beyond it change by more than 10 % with the rotation along the epipolar lines that the
   /// maps show, reported or not. Metres.
   double sure_depth_m = std::numeric_limits<double>::infinity();
@@ -52,5 +54,10 @@ struct CameraComparison {
 std::vector<CameraComparison> compareCameras(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
+
+/// Returns how many times as sharp the events are with the calibration that a comparison found.
+/// @param travel factor of the poses' positions.
+double sharpnessGain(const CameraComparison& found, double travel, Rig rig,
+                     const std::vector<WindowSample>& samples, const FusionMapperOptions& options);
 
 }  // namespace efm

@@ -80,61 +80,67 @@ void use(const CameraComparison& found, const Rig& rig, PoseVerdict& verdict) {
   }
 }
 
-/// Returns whether a mistake is one of a clock.
-bool isClock(const PoseFinding& finding) {
-  return finding.mistake == PoseMistake::kTimeShift || finding.mistake == PoseMistake::kCameraClock;
-}
-
-/// Returns whether a comparison of the cameras explains the events better than a mistake of a
-/// clock. The comparison sees offsets of some milliseconds, which the search for mistakes cannot.
-bool explainsMore(const std::vector<CameraComparison>& compared, const PoseFinding& finding) {
+/// Returns whether a comparison of the cameras explains the events better than a mistake of a clock
+/// does, which a rotation, an offset of some milliseconds and a scale resemble.
+/// @param gain of sharpness by what was compared.
+bool explains(const CameraComparison& found, double gain, const PoseFinding& clock) {
   constexpr double kSeenS = 0.05;  // larger offsets may hide from the comparison,
   constexpr double kFit = 0.6;     // and so may all if the maps do not fit
-  const bool of_camera = finding.mistake == PoseMistake::kCameraClock;
-  return std::any_of(compared.begin(), compared.end(), [&](const CameraComparison& found) {
-    const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
-    return is_named || (of_camera && found.camera == static_cast<int>(*finding.camera) &&
-                        found.correlation >= kFit && std::abs(finding.shift_s) < kSeenS);
-  });
+  if (found.fault == CameraFault::kUnknown) return false;
+  if (found.fault != CameraFault::kNone) return gain >= clock.gain;
+  return clock.camera == static_cast<std::size_t>(found.camera) && found.correlation >= kFit &&
+         std::abs(clock.shift_s) < kSeenS;
 }
 
-/// Judges the poses and the cameras. A known mistake explains more than different depths do.
+/// Judges the poses and the cameras. What makes the events sharpest is named.
 void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
            PoseVerdict& verdict) {
   const PoseJudgement judgement = checkPoses(survey.rig, survey.samples, options);
-  const PoseFinding* finding = judgement.finding ? &*judgement.finding : nullptr;
-  bool is_known = finding != nullptr && finding->mistake != PoseMistake::kUnknown;
-  std::vector<CameraComparison> compared;
-  if (!is_known || isClock(*finding)) {
-    compared = compareCameras(survey.rig, survey.samples, options);
-  }
-  if (is_known && isClock(*finding) && explainsMore(compared, *finding)) {
-    finding = nullptr;
-    is_known = false;
-  }
+  const std::optional<PoseFinding>& finding = judgement.finding;
   QualityFacts& quality = verdict.quality;
   quality.unchecked = judgement.unchecked;
   quality.sharpness = judgement.sharpness;
+  const auto warn = [&](Warning warning) {
+    quality.mistake = warning.name;
+    verdict.warnings.push_back(std::move(warning));
+  };
+  const bool is_known = finding && finding->mistake != PoseMistake::kUnknown;
+  const bool is_camera_clock = finding && finding->mistake == PoseMistake::kCameraClock;
+  if (is_known && !is_camera_clock && finding->mistake != PoseMistake::kTimeShift) {
+    return warn(poseWarning(*finding, survey.rig));
+  }
+  const auto compared = compareCameras(survey.rig, survey.samples, options);
+  const auto agreement = depthAgreement(survey.rig, survey.samples, options);
+  auto disagreement = agreement ? agreementWarning(*agreement) : std::nullopt;
+  double scale = disagreement && disagreement->name == "scale" ? agreement->scale : 1;
   for (const CameraComparison& found : compared) {
-    if (!is_known) use(found, survey.rig, verdict);
+    if (scale != 1 || found.scale == 1) continue;
+    scale = found.scale;
+    disagreement = agreementWarning({scale, 1});
   }
-  std::vector<Warning> warnings;
-  if (is_known) warnings.push_back(poseWarning(*finding, survey.rig));
-  if (!is_known && !verdict.keep_motion) {
-    const auto agreement = depthAgreement(survey.rig, survey.samples, options);
-    if (agreement) {
-      quality.motion_agreement = agreement->agreeing;
-      if (auto warning = agreementWarning(*agreement)) {
-        if (!judgement.unchecked.empty()) warning->text += "; but " + judgement.unchecked;
-        warnings.push_back(std::move(*warning));
-      }
-    }
-    if (warnings.empty() && finding != nullptr)
-      warnings.push_back(poseWarning(*finding, survey.rig));
+  const auto gainOf = [&](const CameraComparison& found, double travel) {
+    return sharpnessGain(found, travel, survey.rig, survey.samples, options);
+  };
+  const double scale_gain = scale == 1 ? 0 : gainOf({}, 1 / scale);
+  const auto explainsClock = [&](const CameraComparison& found) {
+    return explains(found, gainOf(found, 1), *finding);
+  };
+  if (is_known && scale_gain < finding->gain &&
+      std::none_of(compared.begin(), compared.end(), explainsClock)) {
+    verdict.keep_motion = is_camera_clock;
+    return warn(poseWarning(*finding, survey.rig));
   }
-  if (!warnings.empty()) quality.mistake = warnings.front().name;
-  append(verdict.warnings, std::move(warnings));
-  if (verdict.warnings.empty() && !judgement.unchecked.empty()) {
+  for (const CameraComparison& found : compared) {
+    if (scale == 1 || gainOf(found, 1) > scale_gain) use(found, survey.rig, verdict);
+  }
+  if (verdict.keep_motion) return;
+  if (agreement) quality.motion_agreement = agreement->agreeing;
+  if (disagreement) {
+    if (!judgement.unchecked.empty()) disagreement->text += "; but " + judgement.unchecked;
+    return warn(std::move(*disagreement));
+  }
+  if (finding && !is_known) return warn(poseWarning(*finding, survey.rig));
+  if (!judgement.unchecked.empty()) {
     verdict.notes.push_back({"poses-unchecked", judgement.unchecked});
   }
 }

@@ -80,10 +80,10 @@ void addSilence(const SessionStatus& status, bool exclude_silent, Warnings& warn
     if (status.silent_keyframes[c] == 0) continue;
     addWarning(warnings, "silent-keyframes", "camera {} had no event in {} of {} keyframes: {}", c,
                status.silent_keyframes[c], status.counts.keyframes,
-               exclude_silent
-                   ? "the others were fused without it"
-                   : "rules that ask all cameras (min, harmonic, geometric, pairs of two) find nothing there "
-                     "([rig] exclude_silent leaves silent cameras out)");
+               exclude_silent ? "the others were fused without it"
+                              : "rules that ask all cameras (min, harmonic, geometric, pairs of "
+                                "two) find nothing there "
+                                "([rig] exclude_silent leaves silent cameras out)");
   }
   if (status.counts.silent_subintervals > 0) {
     addWarning(warnings, "silent-subintervals",
@@ -291,8 +291,8 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
       "poses-blur",
       fmt::format("the poses blur the events by {:.1f} pixels within a window, and the motion of "
                   "{} of {} keyframes was corrected ([refinement] correct_motion): they are {:.2f} "
-                  "times as sharp{}; a wrong calibration between the cameras, or clocks some ms "
-                  "apart, blur them, too",
+                  "times as sharp{}; a wrong calibration between the cameras, a lens or pixels of "
+                  "another calibration (cropped pictures), or clocks some ms apart blur them, too",
                   motion.meanBlurPx(), motion.corrected, status.counts.keyframes, motion.meanGain(),
                   status.refinement ? ""
                                     : "; their own poses have such errors, too: --set "
@@ -301,11 +301,11 @@ std::optional<Warning> blurWarning(const SessionStatus& status,
 
 void dropExplainedBlur(std::vector<Warning>& warnings) {
   constexpr std::string_view kMistakes[] = {
-      "poses-inverted", "quaternion-order",  "cameras-swapped", "axis-convention",
-      "time-shift",     "poses-unexplained", "depths-disagree", "scale",
-      "camera-clocks",  "events-mirrored",   "sensor-area",     "long-lever",
-      "no-motion",      "rotation-only",     "speed",           "rotation-rate",
-      "pose-jump",      "two-trajectories",  "pose-frame",      "camera-frame",
+      "poses-inverted", "quaternion-order",   "cameras-swapped", "axis-convention",
+      "time-shift",     "poses-unexplained",  "depths-disagree", "scale",
+      "camera-clocks",  "events-mirrored",    "sensor-area",     "long-lever",
+      "no-motion",      "rotation-only",      "speed",           "rotation-rate",
+      "pose-jump",      "two-trajectories",   "pose-frame",      "camera-frame",
       "poses-frozen",   "pose-interpolation", "extrinsics"};
   const auto isMistake = [&](const Warning& warning) {
     return std::find(std::begin(kMistakes), std::end(kMistakes), warning.name) !=
