@@ -496,21 +496,26 @@ std::vector<CameraComparison> compareCameras(const Rig& rig,
   return comparisons;
 }
 
-double sharpnessGain(const CameraComparison& found, double travel, Rig rig,
+Rig fittedRig(const CameraComparison& found, Rig rig) {
+  RigCamera& camera = rig.cameras[static_cast<std::size_t>(found.camera)];
+  camera.T_rig_cam = camera.T_rig_cam * Rigid3{found.R_cam_fitted, Eigen::Vector3d::Zero()};
+  camera.model.fx *= found.zoom;
+  camera.model.fy *= found.zoom;
+  return rig;
+}
+
+double sharpnessGain(const CameraComparison& found, double travel, const Rig& rig,
                      const std::vector<WindowSample>& samples, const FusionMapperOptions& options) {
-  const Rig given = rig;
-  const auto camera = static_cast<std::size_t>(found.camera);
-  RigCamera& fitted = rig.cameras[camera];
-  fitted.T_rig_cam = fitted.T_rig_cam * Rigid3{found.R_cam_fitted, Eigen::Vector3d::Zero()};
-  fitted.model.fx *= found.zoom;
-  fitted.model.fy *= found.zoom;
-  EventSharpness before(given, options);
-  EventSharpness after(rig, options);
+  const Rig fitted = fittedRig(found, rig);
+  EventSharpness before(rig, options);
+  EventSharpness after(fitted, options);
   double sum = 0;
   auto pieces = piecesOf(samples, options.trajectory);
   for (SamplePiece& piece : pieces) {
     const double as_given = before.of(piece, piece.trajectory);
-    for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(found.clock_s);
+    for (Event& event : piece.events[static_cast<std::size_t>(found.camera)]) {
+      event.t_ns += durationFromSeconds(found.clock_s);
+    }
     Trajectory scaled(options.trajectory);
     for (const auto& [t_ns, pose] : piece.trajectory.poses()) {
       scaled.add({t_ns, {pose.rotation, travel * pose.translation}});

@@ -55,9 +55,12 @@ std::vector<CameraComparison> compareCameras(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
 
+/// Returns the rig with the calibration that a comparison found; without a clock.
+Rig fittedRig(const CameraComparison& found, Rig rig);
+
 /// Returns how many times as sharp the events are with the calibration that a comparison found.
 /// @param travel factor of the poses' positions.
-double sharpnessGain(const CameraComparison& found, double travel, Rig rig,
+double sharpnessGain(const CameraComparison& found, double travel, const Rig& rig,
                      const std::vector<WindowSample>& samples, const FusionMapperOptions& options);
 
 }  // namespace efm

@@ -84,10 +84,11 @@ void use(const CameraComparison& found, const Rig& rig, PoseVerdict& verdict) {
 /// does, which a rotation, an offset of some milliseconds and a scale resemble.
 /// @param gain of sharpness by what was compared.
 bool explains(const CameraComparison& found, double gain, const PoseFinding& clock) {
-  constexpr double kSeenS = 0.05;  // larger offsets may hide from the comparison,
-  constexpr double kFit = 0.6;     // and so may all if the maps do not fit
+  constexpr double kSeenS = 0.05;   // larger offsets may hide from the comparison,
+  constexpr double kFit = 0.6;      // and so may all if the maps do not fit
+  constexpr double kMargin = 1.05;  // a small gain of a clock proves little
   if (found.fault == CameraFault::kUnknown) return false;
-  if (found.fault != CameraFault::kNone) return gain >= clock.gain;
+  if (found.fault != CameraFault::kNone) return kMargin * gain >= clock.gain;
   return clock.camera == static_cast<std::size_t>(found.camera) && found.correlation >= kFit &&
          std::abs(clock.shift_s) < kSeenS;
 }
@@ -130,8 +131,17 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
     verdict.keep_motion = is_camera_clock;
     return warn(poseWarning(*finding, survey.rig));
   }
+  // A rotation along the epipolar lines looks like a scale, but at one depth alone.
+  const auto isBetterThanScale = [&](const CameraComparison& found) {
+    constexpr double kMargin = 1.1;  // a wrong scale is up to 5 % sharper than the right clock
+    if (scale == 1) return true;
+    if (kMargin * gainOf(found, 1) < scale_gain) return false;
+    if (found.fault == CameraFault::kClock) return true;
+    const auto fitted = depthAgreement(fittedRig(found, survey.rig), survey.samples, options);
+    return fitted && fitted->agreeing > (agreement ? agreement->agreeing : 0);
+  };
   for (const CameraComparison& found : compared) {
-    if (scale == 1 || gainOf(found, 1) > scale_gain) use(found, survey.rig, verdict);
+    if (isBetterThanScale(found)) use(found, survey.rig, verdict);
   }
   if (verdict.keep_motion) return;
   if (agreement) quality.motion_agreement = agreement->agreeing;

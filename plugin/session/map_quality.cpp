@@ -31,7 +31,7 @@ constexpr double kWrongOfOne = 0.04;     // one camera: a wrong motion looks lik
 constexpr double kWrongIfUnchecked = 0.01;
 constexpr double kGoodBelow = 0.09;
 constexpr double kGoodBelowOfOne = 0.07;
-constexpr double kWrongAbove = 0.35;
+constexpr double kWrongAbove = 0.5;
 constexpr double kWorthSaying = 0.05;
 
 constexpr std::uint32_t kMinShared = 100;  // points; fewer tell nothing

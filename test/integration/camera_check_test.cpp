@@ -18,10 +18,13 @@ class CameraCheckOnTheDesk : public ::testing::Test {
  protected:
   static const test::SimulatedRecording& desk() { return test::SimulatedRecording::desk(); }
 
-  /// Returns a sample of the recording's first seconds.
-  static std::vector<WindowSample> samples(double length_s) {
+  /// Returns a sample of the recording's first seconds. @param travel factor of the positions.
+  static std::vector<WindowSample> samples(double length_s, double travel = 1) {
     Trajectory trajectory;
-    for (const StampedPose& pose : desk().poses()) trajectory.add(pose);
+    for (StampedPose pose : desk().poses()) {
+      pose.T_world_rig.translation *= travel;
+      trajectory.add(pose);
+    }
     const std::int64_t t0_ns = desk().simulation().start_ns;
     const std::int64_t t1_ns = t0_ns + static_cast<std::int64_t>(1e9 * length_s);
     WindowData data{{t0_ns, t1_ns, (t0_ns + t1_ns) / 2}, {}, &trajectory};
@@ -74,7 +77,26 @@ TEST_F(CameraCheckOnTheDesk, NamesTheFaultAndUndoesIt) {
         rig.cameras[1].T_rig_cam * Rigid3{found[0].R_cam_fitted, Eigen::Vector3d::Zero()};
     EXPECT_NEAR(undone.rotation.angularDistance(exact.cameras[1].T_rig_cam.rotation), 0,
                 kToleranceDeg * kRadiansPerDegree);
+    EXPECT_EQ(found[0].scale, 1);
+    if (fault.fault != CameraFault::kNone) {
+      EXPECT_GT(sharpnessGain(found[0], 1, rig, samples(1.6), options()), 1.005);
+    }
     EXPECT_NEAR(found[0].zoom * rig.cameras[1].model.fx / exact.cameras[1].model.fx, 1, 0.005);
+  }
+}
+
+TEST_F(CameraCheckOnTheDesk, TellsAScaleOfThePosesFromAFault) {
+  const Rig& rig = desk().simulation().rig;
+  for (const double travel : {0.5, 2.0, 10.0}) {
+    SCOPED_TRACE(travel);
+    FusionMapperOptions scaled = options();
+    scaled.keyframe.planes.min_depth_m *= travel;  // as automatic limits do
+    scaled.keyframe.planes.max_depth_m *= travel;
+    const auto found = compareCameras(rig, samples(1.6, travel), scaled);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].fault, CameraFault::kNone);
+    EXPECT_NEAR(found[0].scale, travel, 0.1 * travel);
+    EXPECT_GT(sharpnessGain({}, 1 / travel, rig, samples(1.6, travel), scaled), 1.2);
   }
 }
 

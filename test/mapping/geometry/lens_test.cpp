@@ -36,6 +36,17 @@ TEST(Undistortion, ThePrincipalPointLooksAlongTheAxis) {
   }
 }
 
+TEST(Undistortion, TablesOfOneLensShareTheirRays) {
+  const CameraModel model = davis346(DistortionModel::kRadtan, {-0.1386, 0.0934, 0, 0});
+  CameraModel other = model;
+  other.coefficients[0] = -0.1387;
+  const UndistortionTable table(model);
+  EXPECT_EQ(UndistortionTable(model).rays(), table.rays());
+  const UndistortionTable of_other(other);
+  EXPECT_NE(of_other.rays(), table.rays());
+  EXPECT_NE(of_other.ray(0, 0), table.ray(0, 0));
+}
+
 TEST(Undistortion, APixelOutsideTheLensStandsForTheNextInsideTowardsTheAxis) {
   // The image folds over 118 px from the principal point, which may be beside the sensor.
   for (const double cx : {174.0, -30.0}) {

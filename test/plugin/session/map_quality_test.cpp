@@ -71,8 +71,8 @@ TEST(MapQuality, IsGoodWithEvidenceAndSaysWhyItIsNot) {
       {"two cameras, poses not checked",
        [](Wall& w) { w.facts.unchecked = "the poses could not be checked"; },
        QualityWord::kDoubtful, "could not be checked"},
-      {"a wrong calibration", [](Wall& w) { w.facts.sure_depth_m = 2.02; }, QualityWord::kWrong,
-       "calibration between cameras makes 50 %"},
+      {"a wrong calibration", [](Wall& w) { w.facts.sure_depth_m = 1.99; }, QualityWord::kWrong,
+       "calibration between cameras makes 100 %"},
       {"a mistake", [](Wall& w) { w.facts.mistake = "scale"; }, QualityWord::kDoubtful,
        "see the warning scale"},
   };
