@@ -46,9 +46,10 @@ constexpr double kNever = 1e9;
 constexpr Limits kLimits[] = {
     {0.06, 3, 0.1, 4}, {0.15, 2, 0.35, 4}, {0.12, 2, 0.2, 4}, {3, 2, 4, 6}, {0.5, 0, kNever, 0}};
 constexpr double kBlurredPercent = 3.5;
-constexpr double kMinClockPx = 0.25;      // a clock matters where the image moves
-constexpr double kMinZoomGain = 0.002;    // of the correlation
-constexpr double kMinCorrelation = 0.45;  // otherwise the maps are too different
+constexpr double kMaxHiddenChange = 0.055;  // of the depths, by a rotation that poses may hide
+constexpr double kMinClockPx = 0.25;        // a clock matters where the image moves
+constexpr double kMinZoomGain = 0.002;      // of the correlation
+constexpr double kMinCorrelation = 0.45;    // otherwise the maps are too different
 constexpr double kMinCorrelationAcross = 0.3;
 
 /// The parameters of a fit, in the order in which they are added: rotations across, along, roll
@@ -335,7 +336,13 @@ class CameraFit {
     int found = 0;
     for (int i = 1; i <= kZoom; ++i) found = strength(i) > strength(found) ? i : found;
     if (strength(kZoom) >= 1) found = kZoom;  // it looks like a clock, too
-    if (strength(found) < 1) return;
+    if (strength(found) < 1) {
+      // The fit with baselines may take a rotation for an error of the poses.
+      const double along_deg = std::max(std::abs(turned.value[1]), std::abs(whole.value[1]));
+      const bool hides = blurred && depthChange(along_deg + errors[1]) >= kMaxHiddenChange;
+      result.fault = hides ? CameraFault::kUnknown : CameraFault::kNone;
+      return;
+    }
     if (!isProven(found) && isProven(0)) found = 0;  // poses hardly move points across the lines
     result.fault = isProven(found) ? static_cast<CameraFault>(1 + found) : CameraFault::kUnknown;
     if (!blurred) value.head<kClock>() = turned.value.head<kClock>();  // the better estimate
@@ -390,9 +397,14 @@ class CameraFit {
     if (found >= kClock) return;
     result.angle_rad = kRadiansPerDegree * std::abs(value[found]);
     result.R_cam_fitted = rotationBy(kRadiansPerDegree * (axes_ * value.head<3>()));
+    result.depth_change = depthChange(std::abs(value[1]));
+  }
+
+  /// Returns the change of a fused depth by a rotation along the epipolar lines: relative, at the
+  /// median depth.
+  double depthChange(double along_deg) const {
     std::vector<double> depths_m = depths_m_;
-    result.depth_change =
-        kRadiansPerDegree * std::abs(value[1]) * upperMedian(depths_m) / baseline_m_;
+    return kRadiansPerDegree * along_deg * upperMedian(depths_m) / baseline_m_;
   }
 
   /// Adds a time of the window: how far the rig moves the scene in 5 ms before and after it.
