@@ -44,7 +44,7 @@ struct Limits {
 };
 constexpr double kNever = 1e9;
 constexpr Limits kLimits[] = {
-    {0.06, 3, 0.1, 4}, {0.15, 2, 0.35, 4}, {0.12, 2, 0.2, 4}, {3, 2, 4, 6}, {0.5, 0, kNever, 0}};
+    {0.06, 3, 0.1, 4}, {0.15, 2, 0.2, 4}, {0.12, 2, 0.2, 4}, {3, 2, 4, 6}, {0.5, 0, kNever, 0}};
 constexpr double kBlurredPercent = 3.5;
 constexpr double kMaxHiddenChange = 0.055;  // of the depths, by a rotation that poses may hide
 constexpr double kMinClockPx = 0.25;        // a clock matters where the image moves

@@ -450,13 +450,14 @@ def test_ctrl_c_ends_a_map(tmp_path):
         "import sys, event_fusion as ef\n"
         "made = ef.map(ef.open(sys.argv[1]), {'keyframes.stride_s': 0.001}, keep=False)\n"
         "try:\n"
-        "    for keyframe in made: print(keyframe.t, flush=True)\n"
+        "    for i, keyframe in enumerate(made): i or print(keyframe.t, flush=True)\n"
         "finally: print(len(made.points), 'points so far')\n"
     )
     with subprocess.Popen(
         [sys.executable, script, DESK], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as running:
         running.stdout.readline()
+        time.sleep(0.5)  # by now the loop waits for a keyframe, and is not in its own body
         running.send_signal(signal.SIGINT)
         printed, errors = running.communicate(timeout=60)
     assert int(printed.splitlines()[-1].split()[0]) > 0
