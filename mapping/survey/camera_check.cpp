@@ -323,6 +323,7 @@ class CameraFit {
     result.correlation = whole.correlation;
     const bool blurred = (zooms ? zoomed : whole).baseline_rms >= kBlurredPercent ||
                          whole.correlation < kMinCorrelation;
+    result.blurred = blurred;
     const double along_rad = kRadiansPerDegree * std::abs(blurred ? value[1] : turned.value[1]);
     if (along_rad > 0) result.sure_depth_m = 0.1 * baseline_m_ / along_rad;
     const auto isProven = [&](int i) {

@@ -30,6 +30,7 @@ struct CameraComparison {
   int camera = 0;
   int other = 0;  ///< The reference camera.
   CameraFault fault = CameraFault::kNone;
+  bool blurred = false;    ///< True: the poses blur the maps.
   double correlation = 0;  ///< Of the two maps after the fit, at most 1. Right: 0.7 or more.
   // With these changes of the camera's calibration, the two maps fit.
   double angle_rad = 0;  ///< `kAcross`, `kAlong`, `kRoll`: its size.

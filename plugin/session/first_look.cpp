@@ -56,7 +56,7 @@ double wrongBy(const CameraComparison& found) {
     case CameraFault::kFocalLength:
       return std::min(0.7, 0.12 * found.shift_px);
     case CameraFault::kUnknown:  // mostly a tracker's error
-      return 0.05;
+      return 0.04;
     default:
       return 0;
   }
@@ -110,7 +110,7 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   if (is_known && !is_camera_clock && finding->mistake != PoseMistake::kTimeShift) {
     return warn(poseWarning(*finding, survey.rig));
   }
-  const auto compared = compareCameras(survey.rig, survey.samples, options);
+  auto compared = compareCameras(survey.rig, survey.samples, options);
   const auto agreement = depthAgreement(survey.rig, survey.samples, options);
   auto disagreement = agreement ? agreementWarning(*agreement) : std::nullopt;
   double scale = disagreement && disagreement->name == "scale" ? agreement->scale : 1;
@@ -122,6 +122,13 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   const auto gainOf = [&](const CameraComparison& found, double travel) {
     return sharpnessGain(found, travel, survey.rig, survey.samples, options);
   };
+  // A tracker's errors look like a rotation along the epipolar lines, but its cure sharpens
+  // nothing.
+  constexpr double kMinGain = 1.01;
+  for (CameraComparison& found : compared) {
+    const bool is_doubtful = found.fault == CameraFault::kAlong && found.blurred;
+    if (is_doubtful && gainOf(found, 1) < kMinGain) found.fault = CameraFault::kUnknown;
+  }
   const double scale_gain = scale == 1 ? 0 : gainOf({}, 1 / scale);
   const auto explainsClock = [&](const CameraComparison& found) {
     return explains(found, gainOf(found, 1), *finding);
