@@ -131,7 +131,8 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   }
   const double scale_gain = scale == 1 ? 0 : gainOf({}, 1 / scale);
   const auto explainsClock = [&](const CameraComparison& found) {
-    return explains(found, gainOf(found, 1), *finding);
+    const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
+    return explains(found, is_named ? gainOf(found, 1) : 1, *finding);
   };
   if (is_known && scale_gain < finding->gain &&
       std::none_of(compared.begin(), compared.end(), explainsClock)) {
@@ -142,6 +143,7 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   const auto isBetterThanScale = [&](const CameraComparison& found) {
     constexpr double kMargin = 1.1;  // a wrong scale is up to 5 % sharper than the right clock
     if (scale == 1) return true;
+    if (found.fault == CameraFault::kNone) return false;  // nothing to cure
     if (kMargin * gainOf(found, 1) < scale_gain) return false;
     if (found.fault == CameraFault::kClock) return true;
     const auto fitted = depthAgreement(fittedRig(found, survey.rig), survey.samples, options);

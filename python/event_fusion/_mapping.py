@@ -390,10 +390,11 @@ class Map:
     def quality(self) -> dict[str, Any]:
         """How good the map is, by its own evidence.
 
-        ``word`` ("good", "doubtful", "wrong" or "unknown"), ``wrong_share`` (predicted fraction of depths that are off
-        by more than 10 %), ``depth_error`` (predicted median, relative), ``support`` and ``agreement`` (the fraction of
-        depths that a neighbouring keyframe has, too, and the fraction of these that agree within 10 %), ``sharpness``
-        (of the events, relative to that with other clocks or axes of the poses), ``reasons`` (texts), ``keyframes`` (the predicted fraction of right depths of each), ``much_worse`` (keyframes, from 0),
+        ``word`` ("good", "doubtful", "wrong" or "unknown"), ``wrong_share`` (predicted fraction of depths that are
+        off by more than 10 %), ``depth_error`` (predicted median, relative), ``support`` and ``agreement`` (the
+        fraction of depths that a neighbouring keyframe has, too, and the fraction of these that agree within 10 %),
+        ``sharpness`` (of the events, relative to that with other clocks or axes of the poses), ``reasons`` (texts),
+        ``keyframes`` (the predicted fraction of right depths of each), ``much_worse`` (keyframes, from 0),
         ``left_out`` (keyframes without points).
         """
         quality: dict[str, Any] = self.report["quality"]
