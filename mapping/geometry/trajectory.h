@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <istream>
+#include <limits>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -100,6 +101,10 @@ struct MotionCorrection {
   std::size_t reference = 0;  ///< Index of the knot at the reference time.
   /// Small motions: translation in metres, then a rotation vector in radians. None: no correction.
   std::vector<Vector6d> knots;
+  /// The random walk that was expected of the error: standard deviations on each axis, metres and
+  /// radians per root of a second. Infinite: not known.
+  double walk_m = std::numeric_limits<double>::infinity();
+  double walk_rad = std::numeric_limits<double>::infinity();
 
   /// Returns the time of a knot after (negative: before) the reference time.
   double sinceReference(std::size_t knot) const {

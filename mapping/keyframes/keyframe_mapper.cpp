@@ -95,8 +95,8 @@ KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map
     }
     if (!aligned) break;
     if (round == 0) blur_px = 0;
-    constexpr double kSameMotionPx = 0.25;  // less does not blur the DSI
-    if (aligned->shift_px < kSameMotionPx) break;
+    constexpr double kSameMotionPx = 0.25;  // of the finest edges; less does not blur the DSI
+    if (aligned->shift_px < kSameMotionPx * aligned->finest_px) break;
     Trajectory corrected = correctedTrajectory(window.tracked, input.window, aligned->correction);
     KeyframeDepthMap sharper = map_along(input, corrected, nullptr);
     const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
@@ -238,8 +238,9 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
     return mapAlong(part, motion, dsi, stages);
   };
   std::optional<double> looked_px;
+  double finest_px = 1;
   if (!corrects() && !blur_.isDue()) {
-    blur_.add(looked_px);
+    blur_.add(std::nullopt);
     return mapAlong(input, tracked, sink, stages);
   }
   const CentralPart central(input, kCentral);
@@ -250,8 +251,9 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
       const SliceAlignment slices(input, tracked, options_.motion, SliceEffort::look());
       const std::optional<AlignedMotion> aligned = slices.align(central_depth, slices.none());
       if (aligned) looked_px = aligned->shift_px;
+      if (aligned) finest_px = aligned->finest_px;
     }
-    blur_.add(looked_px);
+    blur_.add(looked_px, finest_px);
     if (!corrects()) {
       KeyframeDepthMap keyframe = mapAlong(input, tracked, sink, stages);
       keyframe.blur_px = looked_px;
@@ -261,12 +263,14 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
   std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
   const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
     if (!slices) slices.emplace(input, tracked, options_.motion);
-    return slices->align(depth, start.value_or(slices->none()));
+    auto aligned = slices->align(depth, start.value_or(slices->none()));
+    if (aligned) finest_px = aligned->finest_px;
+    return aligned;
   };
   KeyframeDepthMap keyframe = mapCorrected(
       {input, tracked, options_.motion, central_depth, sink, stages}, map_along, align);
-  if (watches && !looked_px) blur_.add(keyframe.blur_px);
-  if (looked_px) blur_.setLast(keyframe.blur_px.value_or(0));
+  if (watches && !looked_px) blur_.add(keyframe.blur_px, finest_px);
+  if (looked_px) blur_.setLast(keyframe.blur_px.value_or(0), finest_px);
   return keyframe;
 }
 

@@ -79,12 +79,13 @@ class BlurWatch {
   /// Adds a window.
   /// @param blur_px by how much the poses blur its events, pixels; std::nullopt: not looked at, or
   /// not known.
-  void add(std::optional<double> blur_px);
+  /// @param finest_px see AlignedMotion: a blur is judged in these pixels.
+  void add(std::optional<double> blur_px, double finest_px = 1);
   /// Replaces the blur of the last window that was looked at by a better value.
-  void setLast(double blur_px) { last_px_.front() = blur_px; }
+  void setLast(double blur_px, double finest_px = 1) { last_px_.front() = blur_px / finest_px; }
 
  private:
-  std::vector<double> last_px_;  // the newest first
+  std::vector<double> last_px_;  // of the finest edges; the newest first
   int since_look_ = 0;           // windows
 };
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "mapping/geometry/timestamp.h"
 
@@ -204,23 +205,32 @@ std::vector<Eigen::Vector3d> SliceAlignment::pointsOf(const cv::Mat1f& depth) co
 
 /// The normal equations of one slice for a small motion of the rig.
 struct SliceAlignment::Equations {
+  /// The residuals of a point in the cameras that see it.
+  struct Residuals {
+    double sum = 0;
+    int count = 0;
+  };
+
   Matrix6d information = Matrix6d::Zero();  // its lower half
   Vector6d gradient = Vector6d::Zero();
+  std::vector<Residuals> residuals;  // of each point; none: the slice takes no part
 
-  void add(double residual, const Vector6d& by_motion) {
+  void add(double residual, double weight, const Vector6d& by_motion) {
+    const Vector6d weighted = weight * by_motion;
     for (int column = 0; column < 6; ++column) {
       for (int row = column; row < 6; ++row) {
-        information(row, column) += by_motion[row] * by_motion[column];
+        information(row, column) += by_motion[row] * weighted[column];
       }
     }
-    gradient += residual * by_motion;
+    gradient += residual * weighted;
   }
 };
 
 SliceAlignment::Equations SliceAlignment::equationsOf(std::size_t slice, const Rigid3& T_ref_rig,
-                                                      const std::vector<Eigen::Vector3d>& points,
+                                                      const WeightedPoints& points,
                                                       std::size_t level) const {
   Equations sums;
+  sums.residuals.resize(points.p_ref.size());
   const Rigid3 T_rig_ref = T_ref_rig.inverse();
   const Eigen::Matrix3d R_rig_ref = T_rig_ref.rotation.toRotationMatrix();
   const double scale = std::ldexp(1.0, -finest_ - static_cast<int>(level));
@@ -230,8 +240,8 @@ SliceAlignment::Equations SliceAlignment::equationsOf(std::size_t slice, const R
     const ReferenceView& view = views_[c];
     const Rigid3 T_cam_rig = input_.cameras[c].calibration->T_rig_cam.inverse();
     const Eigen::Matrix3d R_cam_rig = T_cam_rig.rotation.toRotationMatrix();
-    for (const Eigen::Vector3d& p_ref : points) {
-      const Eigen::Vector3d p_rig = R_rig_ref * p_ref + T_rig_ref.translation;
+    for (std::size_t i = 0; i < points.p_ref.size(); ++i) {
+      const Eigen::Vector3d p_rig = R_rig_ref * points.p_ref[i] + T_rig_ref.translation;
       const Eigen::Vector3d p_cam = R_cam_rig * p_rig + T_cam_rig.translation;
       if (!(p_cam.z() > kMinDepthM)) continue;
       const Eigen::Vector2d pixel = view.project(p_cam);
@@ -248,13 +258,34 @@ SliceAlignment::Equations SliceAlignment::equationsOf(std::size_t slice, const R
       const Eigen::Vector3d by_rig = R_cam_rig.transpose() * by_cam;
       Vector6d by_motion;
       by_motion << by_rig, p_rig.cross(by_rig);
-      sums.add(residual, by_motion);
+      sums.add(residual, points.weights[i], by_motion);
+      sums.residuals[i].sum += residual;
+      ++sums.residuals[i].count;
     }
   }
-  const double weight = kIndependentPoints / static_cast<double>(points.size());
+  const double weight =
+      kIndependentPoints / std::accumulate(points.weights.begin(), points.weights.end(), 0.0);
   sums.information *= weight;
   sums.gradient *= weight;
   return sums;
+}
+
+/// Weighs each point by its mean residual in all slices: from 1 on the edges to nearly 0 for a
+/// point whose residual is that of any place, because its depth is wrong. Otherwise wrong points
+/// decide on the motions that the view of one wall hardly shows.
+void SliceAlignment::weigh(WeightedPoints& points, const std::vector<Equations>& slices) const {
+  constexpr double kAnywhere = 1;  // the mean residual over the image: edges sum to 0
+  constexpr double kLeast = 0.01;
+  for (std::size_t i = 0; i < points.p_ref.size(); ++i) {
+    Equations::Residuals all;
+    for (const Equations& slice : slices) {
+      if (slice.residuals.empty()) continue;
+      all.sum += slice.residuals[i].sum;
+      all.count += slice.residuals[i].count;
+    }
+    const double mean = all.count > 0 ? all.sum / all.count : kAnywhere;
+    points.weights[i] = std::max(kLeast, kAnywhere - mean);
+  }
 }
 
 namespace {
@@ -324,12 +355,13 @@ class WalkSolver {
 
 std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
                                                    const MotionCorrection& start) const {
-  const std::vector<Eigen::Vector3d> points = pointsOf(depth);
+  WeightedPoints points{pointsOf(depth), {}};
+  points.weights.assign(points.p_ref.size(), 1.0);
   const std::size_t count = none_.knots.size();
-  if (points.size() < kMinPoints || !has_pose_[none_.reference]) return std::nullopt;
+  if (points.p_ref.size() < kMinPoints || !has_pose_[none_.reference]) return std::nullopt;
   double inverse_depth = 0;
-  for (const Eigen::Vector3d& point : points) inverse_depth += 1 / point.z();
-  inverse_depth /= static_cast<double>(points.size());
+  for (const Eigen::Vector3d& point : points.p_ref) inverse_depth += 1 / point.z();
+  inverse_depth /= static_cast<double>(points.p_ref.size());
   const double sigma_m =
       effort_.spacing_s * std::max(options_.motion_sigma_m_s, kVelocityError * speed_m_s_);
   // Errors of position and rotation together keep the image aligned.
@@ -356,6 +388,7 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
     }
     const auto changes = solver.solve();
     if (!changes) return std::nullopt;
+    weigh(points, equations);
     for (std::size_t slice = 0; slice < count; ++slice) {
       knots[slice] += changes->segment<6>(static_cast<Eigen::Index>(6 * slice));
     }
@@ -363,13 +396,15 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
 
   // All poses move together, so that the pose at the reference time stays.
   const Rigid3 back = T_ref_tracked_[none_.reference] * poseAt(none_.reference).inverse();
-  AlignedMotion found{none_};
+  AlignedMotion found{none_, 0, std::ldexp(1.0, finest_)};
+  found.correction.walk_m = sigma_m / std::sqrt(effort_.spacing_s);
+  found.correction.walk_rad = sigma_rad / std::sqrt(effort_.spacing_s);
   for (std::size_t slice = 0; slice < count; ++slice) {
     if (!has_pose_[slice] || slice == none_.reference) continue;
     found.correction.knots[slice] =
         differenceOf(T_ref_tracked_[slice].inverse() * back * poseAt(slice));
   }
-  found.shift_px = shiftBetween(start, found.correction, points);
+  found.shift_px = shiftBetween(start, found.correction, points.p_ref);
   return found;
 }
 

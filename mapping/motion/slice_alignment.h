@@ -44,6 +44,9 @@ struct AlignedMotion {
   /// Root mean square of the distances by which the correction differs from the start, in the
   /// image, over points and slices, pixels.
   double shift_px = 0;
+  /// Size of a pixel of the finest edges, in pixels of the camera's view. A smaller shift is no
+  /// error of the motion.
+  double finest_px = 1;
 };
 
 /// Aligns short slices of a window's events with the points of a depth map of the window, in all
@@ -51,8 +54,9 @@ struct AlignedMotion {
 ///
 /// The poses of the slices are found together by Gauss-Newton steps, from blurred to sharp edges.
 /// Their prior is the tracker's motion with a random walk of its error. Slices far from the
-/// reference time join step by step, because errors grow with the distance. Then all poses are
-/// moved together so that the pose at the reference time stays.
+/// reference time join step by step, because errors grow with the distance. Points that lie on no
+/// edges lose weight from step to step: they are wrong. Then all poses are moved together so that
+/// the pose at the reference time stays.
 class SliceAlignment {
  public:
   /// Finds the edges of all slices, in parallel on the threads of the caller's task arena. Memory:
@@ -70,11 +74,16 @@ class SliceAlignment {
 
  private:
   struct Equations;
+  struct WeightedPoints {
+    std::vector<Eigen::Vector3d> p_ref;
+    std::vector<double> weights;  // from 0 to 1
+  };
 
   double speed() const;
   std::vector<Eigen::Vector3d> pointsOf(const cv::Mat1f& depth) const;
-  Equations equationsOf(std::size_t slice, const Rigid3& T_ref_rig,
-                        const std::vector<Eigen::Vector3d>& points, std::size_t level) const;
+  Equations equationsOf(std::size_t slice, const Rigid3& T_ref_rig, const WeightedPoints& points,
+                        std::size_t level) const;
+  void weigh(WeightedPoints& points, const std::vector<Equations>& slices) const;
   double shiftBetween(const MotionCorrection& a, const MotionCorrection& b,
                       const std::vector<Eigen::Vector3d>& points) const;
 

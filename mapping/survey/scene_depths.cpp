@@ -178,7 +178,8 @@ FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
   coarse.extraction.extraction = coarseness.extraction;
   coarse.extraction.neighbours = false;
   coarse.extraction.min_probability = kCoarseProbability;
-  coarse.motion = {};
+  coarse.motion.correct_motion = coarseness.correct_motion;
+  coarse.motion.motion_rounds = 1;
   coarse.camera_maps = false;
   coarse.event_images = false;
   coarse.view_events = false;

@@ -96,6 +96,8 @@ struct Coarseness {
   double plane_step_px = 1;        ///< Parallax between neighbouring planes, pixels.
   double nearest_m = kNearestSceneM;
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
+  /// The windows whose motion is corrected, in one round.
+  MotionCorrectionUse correct_motion = MotionCorrectionUse::kNever;
 };
 
 /// A coarse sweep of samples in a small view, over a wide range of depths that follows from the

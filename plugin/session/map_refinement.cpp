@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/map_refinement.h"
 
+#include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
@@ -35,6 +37,33 @@ Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
          state.tracker.driftCovariance(lever_m.norm());
 }
 
+namespace {
+
+/// Returns whether a correction has the size of the expected errors, in the whole window and at a
+/// time after (negative: before) the reference time.
+bool isLikely(const MotionCorrection& correction, double since_s) {
+  // Of simulated trackers, poor ones too: up to 1.1 (translation) and 1.4 (rotation).
+  constexpr double kMaxRmsSigmas = 2;
+  constexpr double kMaxSigmas = 4;
+  double squared_m = 0;
+  double squared_rad = 0;
+  double variance = 0;  // of three axes, of a walk of 1
+  for (std::size_t i = 0; i < correction.knots.size(); ++i) {
+    squared_m += correction.knots[i].head<3>().squaredNorm();
+    squared_rad += correction.knots[i].tail<3>().squaredNorm();
+    variance += 3 * std::abs(correction.sinceReference(i));
+  }
+  const double rms = std::sqrt(variance);
+  const double then = std::sqrt(std::abs(since_s));
+  const Vector6d error = differenceOf(correction.displacement(since_s));
+  return std::sqrt(squared_m) <= kMaxRmsSigmas * rms * correction.walk_m &&
+         std::sqrt(squared_rad) <= kMaxRmsSigmas * rms * correction.walk_rad &&
+         error.head<3>().norm() <= kMaxSigmas * then * correction.walk_m &&
+         error.tail<3>().norm() <= kMaxSigmas * then * correction.walk_rad;
+}
+
+}  // namespace
+
 WindowMotion::WindowMotion(const KeyframeDepthMap& keyframe)
     : t_ref_ns(keyframe.window.t_ref_ns),
       T_world_ref(keyframe.T_world_ref),
@@ -47,8 +76,11 @@ std::optional<Rigid3> motionBetween(const WindowMotion& from, const WindowMotion
   const auto correctionAt = [](const WindowMotion& window,
                                std::int64_t t_ns) -> std::optional<Rigid3> {
     const double since_s = secondsBetween(window.t_ref_ns, t_ns);
-    if (!window.correction || !window.correction->covers(since_s)) return std::nullopt;
-    return window.T_rig_ref.inverse() * window.correction->displacement(since_s) * window.T_rig_ref;
+    const std::optional<MotionCorrection>& correction = window.correction;
+    if (!correction || !correction->covers(since_s) || !isLikely(*correction, since_s)) {
+      return std::nullopt;
+    }
+    return window.T_rig_ref.inverse() * correction->displacement(since_s) * window.T_rig_ref;
   };
   const std::optional<Rigid3> by_from = correctionAt(from, to.t_ref_ns);
   const std::optional<Rigid3> by_to = correctionAt(to, from.t_ref_ns);

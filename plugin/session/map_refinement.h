@@ -42,8 +42,9 @@ struct WindowMotion {
 };
 
 /// Returns the motion between the reference times of two windows by the events around these times:
-/// the mean of what both windows say.
-/// @return std::nullopt if no window has a corrected motion that reaches the other's time.
+/// the mean of what both windows say. A correction far beyond the expected errors of the tracker
+/// does not count: wrong depths may have bent it.
+/// @return std::nullopt if no window has such a corrected motion that reaches the other's time.
 std::optional<Rigid3> motionBetween(const WindowMotion& from, const WindowMotion& to);
 
 /// Refines keyframes one after the other, optionally in a background thread. One thread calls it.

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <random>
 #include <vector>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/motion/motion_correction.h"
+#include "mapping/motion/slice_alignment.h"
 #include "test/integration/simulated_recording.h"
 #include "test/mapping/depth/same_image.h"
 
@@ -38,6 +41,11 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
         correct_motion ? MotionCorrectionUse::kAlways : MotionCorrectionUse::kNever;
     options.motion.motion_rounds = 3;
     KeyframeMapper mapper(desk().simulation().rig, {0, 1}, options);
+    return mapper.map(window(), events(), trajectory).value();
+  }
+
+  /// Returns the events of the window, per camera.
+  static std::vector<EventSpan> events() {
     std::vector<EventSpan> events;
     for (const std::vector<Event>& camera : desk().events()) {
       const auto end = std::find_if(camera.begin(), camera.end(), [](const Event& event) {
@@ -45,7 +53,7 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
       });
       events.emplace_back(camera.data(), camera.data() + (end - camera.begin()));
     }
-    return mapper.map(window(), events, trajectory).value();
+    return events;
   }
 
   /// Returns the median of the relative depth errors.
@@ -85,6 +93,40 @@ TEST_F(MotionCorrectionOnTheDesk, AWrongMotionIsFoundAndDepthIsThatOfExactPoses)
     }
     EXPECT_LT(std::sqrt(turn), 0.1 * kRadiansPerDegree);
   }
+}
+
+/// Depths as of a blurred window, where many are at a half of the true ones or less: they lie on no
+/// edges, and do not bend a right motion.
+TEST_F(MotionCorrectionOnTheDesk, WrongDepthsDoNotDecideTheMotion) {
+  const KeyframeDepthMap keyframe = map(truth(), false);
+  std::vector<UndistortionTable> undistortion;
+  const Rig& rig = desk().simulation().rig;
+  for (const RigCamera& camera : rig.cameras) undistortion.emplace_back(camera.model);
+  std::vector<CameraEvents> cameras;
+  for (std::size_t c = 0; c < 2; ++c) {
+    cameras.push_back({static_cast<int>(c), &rig.cameras[c], &undistortion[c], events()[c]});
+  }
+  const DepthPlanes planes;
+  const WindowInput input{window(), cameras, keyframe.view, planes, keyframe.T_world_ref};
+  const MotionCorrectionOptions options;
+  const SliceAlignment slices(input, truth(), options);
+  const auto errorWith = [&](double wrong) {  // metres
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    cv::Mat1f depth = keyframe.map.depth.clone();
+    for (float& depth_m : depth) {
+      const double scale = uniform(random) < wrong ? 0.3 + 0.2 * uniform(random) : 1;
+      depth_m *= static_cast<float>(scale);
+    }
+    const auto aligned = slices.align(depth, slices.none());
+    double squared = 0;
+    for (const Vector6d& knot : aligned.value().correction.knots) {
+      squared += knot.head<3>().squaredNorm();
+    }
+    return std::sqrt(squared / static_cast<double>(slices.none().knots.size()));
+  };
+  EXPECT_LT(errorWith(0.1), 2 * errorWith(0)) << "4 times if all points count alike";
+  EXPECT_LT(errorWith(0.2), 0.003) << "5 mm if all points count alike; a slice is right to 0.5 mm";
 }
 
 TEST_F(MotionCorrectionOnTheDesk, ExactPosesStayAsTheyAre) {

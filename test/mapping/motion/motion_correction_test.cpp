@@ -131,6 +131,11 @@ TEST(BlurWatch, IsOnByTheMedianOfThreeAndLooksNowAndThen) {
   watch.add(0.3);
   EXPECT_FALSE(watch.isOn()) << "0.5, 0.3, 0.3";
   EXPECT_EQ(windowsUntilDue(), 7);
+  for (const double blur_px : {0.7, 0.9}) {
+    BlurWatch coarse;
+    coarse.add(blur_px, 2);
+    EXPECT_EQ(coarse.isOn(), blur_px > 0.8) << "0.4 of pixels that are twice as large";
+  }
 }
 
 TEST(CentralPart, HasTheEventsAroundTheReferenceTime) {

@@ -89,6 +89,18 @@ TEST(MotionBetween, IsThatOfTheEventsOfBothWindows) {
   EXPECT_NEAR(by_to->translation.x(), 0.3 * (0.16 - 0.04), 1e-9);
   EXPECT_FALSE(motionBetween(WindowMotion(a), WindowMotion(far))) << "0.4 s apart, 0.3 s known";
   EXPECT_FALSE(motionBetween(WindowMotion(without), WindowMotion(without)));
+  // The correction at 0.2 s is 0.012 m, its root mean square 0.3 times the walk of 0.04 m.
+  const auto expecting = [&a](double walk_m) {
+    KeyframeDepthMap keyframe = a;
+    keyframe.motion_correction->walk_m = walk_m;
+    return WindowMotion(keyframe);
+  };
+  EXPECT_TRUE(motionBetween(expecting(0.04), WindowMotion(without)));
+  EXPECT_FALSE(motionBetween(expecting(0.006), WindowMotion(without))) << "4.5 sigma at 0.2 s";
+  KeyframeDepthMap turned = a;
+  turned.motion_correction->knots.back()[4] = 0.2;
+  turned.motion_correction->walk_rad = 0.05;
+  EXPECT_FALSE(motionBetween(WindowMotion(turned), WindowMotion(without))) << "in the window";
 }
 
 class MapRefinementInEitherMode : public testing::TestWithParam<bool> {};
