@@ -122,17 +122,21 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   const auto gainOf = [&](const CameraComparison& found, double travel) {
     return sharpnessGain(found, travel, survey.rig, survey.samples, options);
   };
-  // A tracker's errors look like a rotation along the epipolar lines, but its cure sharpens
-  // nothing.
-  constexpr double kMinGain = 1.01;
+  // A tracker's errors look like a fault of the cameras, but its cure sharpens nothing.
+  constexpr double kMinGain = 0.988;  // simulated faults 0.99 and more; trackers 0.975 and 0.987
+  constexpr double kMinGainAlong = 1.01;  // a rotation along the epipolar lines, by blurred maps
+  const auto isNamed = [](const CameraComparison& found) {
+    return found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
+  };
   for (CameraComparison& found : compared) {
     const bool is_doubtful = found.fault == CameraFault::kAlong && found.blurred;
-    if (is_doubtful && gainOf(found, 1) < kMinGain) found.fault = CameraFault::kUnknown;
+    if (isNamed(found) && gainOf(found, 1) < (is_doubtful ? kMinGainAlong : kMinGain)) {
+      found.fault = CameraFault::kUnknown;
+    }
   }
   const double scale_gain = scale == 1 ? 0 : gainOf({}, 1 / scale);
   const auto explainsClock = [&](const CameraComparison& found) {
-    const bool is_named = found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
-    return explains(found, is_named ? gainOf(found, 1) : 1, *finding);
+    return explains(found, isNamed(found) ? gainOf(found, 1) : 1, *finding);
   };
   if (is_known && scale_gain < finding->gain &&
       std::none_of(compared.begin(), compared.end(), explainsClock)) {
