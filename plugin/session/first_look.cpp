@@ -122,15 +122,17 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   const auto gainOf = [&](const CameraComparison& found, double travel) {
     return sharpnessGain(found, travel, survey.rig, survey.samples, options);
   };
-  // A tracker's errors look like a fault of the cameras, but its cure sharpens nothing.
-  constexpr double kMinGain = 0.988;  // simulated faults 0.99 and more; trackers 0.975 and 0.987
+  // A tracker's errors look like a fault of the cameras, but its cure sharpens nothing. Simulated
+  // faults have a gain of 1.002 and more; among three cameras, where the cure of one pair moves a
+  // camera against the third, 0.99; trackers 0.975 to 0.99.
+  const double min_gain = compared.size() == 1 ? 0.998 : 0.988;
   constexpr double kMinGainAlong = 1.01;  // a rotation along the epipolar lines, by blurred maps
   const auto isNamed = [](const CameraComparison& found) {
     return found.fault != CameraFault::kNone && found.fault != CameraFault::kUnknown;
   };
   for (CameraComparison& found : compared) {
     const bool is_doubtful = found.fault == CameraFault::kAlong && found.blurred;
-    if (isNamed(found) && gainOf(found, 1) < (is_doubtful ? kMinGainAlong : kMinGain)) {
+    if (isNamed(found) && gainOf(found, 1) < (is_doubtful ? kMinGainAlong : min_gain)) {
       found.fault = CameraFault::kUnknown;
     }
   }
