@@ -178,13 +178,13 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
 
 void KeyframeRefiner::refineNewest(const std::optional<Rigid3>& T_last_ref) {
   const std::size_t number = graph_.newest();
-  const bool has_common_events = T_last_ref && useCommonEvents(*T_last_ref);
+  if (T_last_ref) useCommonEvents(*T_last_ref);
   const auto window = static_cast<std::size_t>(options_.window);
   if (number > window) {
     graph_.keyframes[number - window - 1].cloud.releaseTree();
     graph_.addPlace(number - window - 1);
   }
-  if (!registerNewest() && has_common_events) dropCommonEvents();  // 2.
+  registerNewest();  // 2.
   const std::size_t first_free = number + 1 > window ? number + 1 - window : 0;
   updateCovariance(graph_.solveFrom(first_free, options_.graph));  // 3.
   loops_.search(graph_);                                           // 4.
@@ -237,29 +237,20 @@ bool isPlausible(const Registration& registration) {
 }  // namespace
 
 /// Adds the motion since the last keyframe that the events of both windows show, and starts from
-/// it. @return false without points.
-bool KeyframeRefiner::useCommonEvents(const Rigid3& T_last_ref) {
+/// it.
+void KeyframeRefiner::useCommonEvents(const Rigid3& T_last_ref) {
   // Slices of 10 ms lie within 0.3 pixels of the depth map, in six directions.
   constexpr double kSigmaPx = 0.3;
   const std::size_t number = graph_.newest();
   RefinedKeyframe& newest = graph_.keyframes[number];
   const RefinedKeyframe& last = graph_.keyframes[number - 1];
   const Matrix6d information = 6 / (kSigmaPx * kSigmaPx) * informationOfPixel(newest.cloud);
-  if (information.isZero(0)) return false;
+  if (information.isZero(0)) return;
   RelativePoseFactor factor{number - 1, number, T_last_ref};
   factor.sqrt_information = sqrtInformation(inverseOf(information + 1e-6 * Matrix6d::Identity()));
   newest.T_world_ref = last.T_world_ref * T_last_ref;
   graph_.factors.push_back(factor);
   graph_.tracker.addSample(factor, last, newest);
-  return true;
-}
-
-/// Drops this motion: nothing else could correct it, and the errors of the tracker would be learnt
-/// from it.
-void KeyframeRefiner::dropCommonEvents() {
-  graph_.factors.pop_back();
-  graph_.tracker.dropNewestSample();
-  predict(graph_.keyframes[graph_.newest() - 1], graph_.keyframes.back());
 }
 
 /// Registers the newest keyframe, if its points are not found, once more with points that are
@@ -289,8 +280,7 @@ Registration KeyframeRefiner::registrationOf(const std::vector<MapKeyframe>& map
   return again;
 }
 
-/// @return whether the newest keyframe was registered.
-bool KeyframeRefiner::registerNewest() {
+void KeyframeRefiner::registerNewest() {
   const std::size_t number = graph_.newest();
   RefinedKeyframe& newest = graph_.keyframes[number];
   const auto window = static_cast<std::size_t>(options_.window);
@@ -306,7 +296,7 @@ bool KeyframeRefiner::registerNewest() {
       errors.driftCovariance(newest.path_length_m - graph_.keyframes[number - 1].path_length_m);
   const Registration registration = registrationOf(map, covariance);
   graph_.failed_solves += registration.failed_solves;
-  if (!isPlausible(registration)) return false;
+  if (!isPlausible(registration)) return;
   ++registered_;
   newest.T_world_ref = registration.T_world_ref;
   for (const RelativePoseFactor& factor : registration.factors) {
@@ -314,7 +304,6 @@ bool KeyframeRefiner::registerNewest() {
     graph_.tracker.addSample(factor, graph_.keyframes[factor.from], newest);
   }
   graph_.tracker.update();
-  return true;
 }
 
 void KeyframeRefiner::updateCovariance(const WindowGraph& solved) {

@@ -99,8 +99,7 @@ class KeyframeRefiner {
   /// Adds the next keyframe. Numbers count from 0.
   /// @param stated the noise of this pose as the tracker states it. It replaces the expected noise.
   /// If errors are learnt, it is corrected by the same factor.
-  /// @param T_last_ref pose relative to the last keyframe by events that both windows have. It
-  /// counts only if the keyframe is registered.
+  /// @param T_last_ref pose relative to the last keyframe by events that both windows have.
   /// @throws std::invalid_argument as `requireUsable`. Then the keyframe is not added. After any
   /// other error, `keyframes` shows whether it was added. If so, it has lost its points, and keeps
   /// the tracker's motion. In both cases the next keyframe may be added.
@@ -138,9 +137,8 @@ class KeyframeRefiner {
   static void predict(const RefinedKeyframe& last, RefinedKeyframe& keyframe);
   void refineNewest(const std::optional<Rigid3>& T_last_ref);
   void dropNewestPoints();
-  bool useCommonEvents(const Rigid3& T_last_ref);
-  void dropCommonEvents();
-  bool registerNewest();
+  void useCommonEvents(const Rigid3& T_last_ref);
+  void registerNewest();
   Registration registrationOf(const std::vector<MapKeyframe>& map,
                               const Matrix6d& covariance) const;
   void updateCovariance(const WindowGraph& solved);

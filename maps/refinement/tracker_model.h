@@ -64,8 +64,6 @@ class TrackerModel {
   /// @param from, to the keyframes of the factor.
   void addSample(const RelativePoseFactor& factor, const RefinedKeyframe& from,
                  const RefinedKeyframe& to);
-  /// Takes the last `addSample` back. @pre There was one.
-  void dropNewestSample() { samples_.pop_back(); }
   /// Estimates the errors from the last samples.
   void update() {
     if (adapt_) errors_ = estimateTrackerErrors({samples_.begin(), samples_.end()}, expected_);

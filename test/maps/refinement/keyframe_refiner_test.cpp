@@ -138,33 +138,6 @@ TEST(KeyframeRefiner, FollowsTheMotionsByCommonEvents) {
   EXPECT_GT(refiner.trackerErrors().noise_m, 0.05);
 }
 
-/// A keyframe whose depths are wrong, and a motion by its events that these depths have bent: no
-/// registration can correct it, so the tracker's motion stays.
-TEST(KeyframeRefiner, AMotionByEventsThatNothingConfirmsMakesNothingWorse) {
-  for (unsigned seed = 1; seed <= 24; ++seed) {
-    SCOPED_TRACE(seed);
-    std::mt19937 random(seed);
-    const Poses truth = circle(6, 5);
-    auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-    const std::size_t wrong = 1 + seed % 5;
-    seen[wrong] =
-        test::seenFrom(test::edgesAround(250, random), truth[0], kInverseDepthSigma, random);
-    const Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
-    KeyframeRefiner refiner(quick());
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      std::optional<Rigid3> T_last_ref;
-      if (i > 0) T_last_ref = truth[i - 1].inverse() * truth[i];
-      if (i == wrong) *T_last_ref = *T_last_ref * drawMotion(0.05, 0.05, random);
-      refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i], std::nullopt, T_last_ref);
-    }
-    refiner.finish();
-    const Errors by_tracker = errorsOf(tracked, truth);
-    const Errors refined = errorsOf(posesOf(refiner), truth);
-    EXPECT_LT(refined.m, 1.1 * by_tracker.m + 0.002);
-    EXPECT_LT(refined.rad, 1.1 * by_tracker.rad + 0.002);
-  }
-}
-
 TEST(KeyframeRefiner, TakesMostOfATrackersNoiseAway) {
   Errors before;
   Errors after;

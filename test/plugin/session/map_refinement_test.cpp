@@ -140,6 +140,34 @@ TEST_P(MapRefinementInEitherMode, EndsAtTheRefinersPoses) {
   EXPECT_TRUE(isSame(refinement.predict(T_odom_ref), state.T_world_odom * T_odom_ref));
 }
 
+/// Corrections that wrong depths have bent: the poses are those without any correction.
+TEST(MapRefinement, CorrectionsFarBeyondATrackersErrorsChangeNothing) {
+  const std::vector<KeyframeDepthMap> keyframes = shakenKeyframes();
+  const std::map<std::size_t, Rigid3> without = refinedAlone(keyframes);
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 0.05);  // metres and radians
+    MapRefinement refinement(refinementOptions(false));
+    for (KeyframeDepthMap keyframe : keyframes) {
+      MotionCorrection& correction = keyframe.motion_correction.emplace();
+      correction.spacing_s = 1;
+      correction.reference = 1;
+      correction.walk_m = 0.002;
+      correction.walk_rad = 0.002;
+      correction.knots.assign(3, Vector6d::Zero());
+      for (const std::size_t end : {0, 2}) {
+        for (double& value : correction.knots[end]) value = normal(random);
+      }
+      refinement.add(keyframe, std::nullopt);
+    }
+    refinement.finish();
+    const std::map<std::size_t, Rigid3> moved = refinement.takeMoved();
+    ASSERT_EQ(moved.size(), without.size());
+    for (const auto& [number, pose] : without) EXPECT_TRUE(isSame(moved.at(number), pose));
+  }
+}
+
 TEST(CovarianceAt, ARotationMovesTheRigAcrossItsLever) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> number(-1, 1);
