@@ -27,13 +27,15 @@ efm::MapCloud::ConstPtr mapOf(const std::vector<efm::RigCamera>& cameras,
 int main(int argc, char** argv) try {
   if (argc != 3) throw std::runtime_error("usage: own_data RECORDING POSES.txt");
   // Your driver and your tracker fill these arrays. Here a recording and a file of poses do.
-  const std::vector<efm::StampedPose> poses = efm::readTumTrajectory(argv[2]);
+  std::vector<efm::StampedPose> poses;
   const auto recording = efm::openRecording({argv[1]}, {argv[2]});
   std::vector<std::vector<efm::Event>> events(recording->rig().cameras.size());
   while (const auto sample = recording->next()) {
     if (const auto* packet = std::get_if<efm::EventPacket>(&*sample)) {
       std::vector<efm::Event>& all = events[packet->camera];
       all.insert(all.end(), packet->events.begin(), packet->events.end());
+    } else if (const auto* pose = std::get_if<efm::PoseSample>(&*sample)) {
+      poses.push_back({pose->t_ns, pose->T_world_body * pose->T_body_rig});
     }
   }
   const auto map = mapOf(recording->rig().cameras, std::move(events), poses);

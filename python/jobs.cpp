@@ -215,8 +215,11 @@ std::string cloudErrorJson(const Path& estimate, const Path& truth, bool align, 
 }
 
 std::string trajectoryErrorJson(const Path& estimate, const Path& truth,
-                                const std::string& alignment, double max_difference_s) {
+                                const std::string& alignment, double max_difference_s,
+                                const std::string& estimate_unit, const std::string& truth_unit) {
   TrajectoryEvaluationOptions options;
+  options.estimate_time_unit = estimate_unit;
+  options.truth_time_unit = truth_unit;
   options.alignment = valueIn(kTrajectoryAlignments, alignment);
   options.max_difference_s = max_difference_s;
   return evaluationJson(evaluateTrajectory(estimate, truth, options));

@@ -8,10 +8,13 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -45,6 +48,26 @@ CoefficientCount checkCoefficientCount(DistortionModel model, std::size_t count)
 std::string_view nameOf(DistortionModel model) { return nameIn(kDistortionModels, model); }
 DistortionModel distortionModelFromName(std::string_view name) {
   return valueIn(kDistortionModels, name);
+}
+
+CameraModel cutTo(const SensorArea& area, CameraModel model) {
+  const auto cut = [](double binning, double from, double count, int& side, double& f, double& c) {
+    binning = std::max(1.0, binning);
+    const double whole = count > 0 ? count : side;
+    const double pixels = std::floor(whole / binning);
+    if (!(from >= 0 && pixels >= 1 && from + whole <= side)) {
+      NumberText text(6);
+      text << "roi, binning: " << whole << " pixels from " << from << " on, " << binning
+           << " in one: expected an area in the sensor's " << side;
+      throw std::runtime_error(text.str());
+    }
+    side = static_cast<int>(pixels);
+    f /= binning;
+    c = (c - from - (binning - 1) / 2) / binning;  // pixel 0 is the middle of the first ones
+  };
+  cut(area.binning_x, area.x, area.width, model.width, model.fx, model.cx);
+  cut(area.binning_y, area.y, area.height, model.height, model.fy, model.cy);
+  return model;
 }
 
 void CameraModel::validate() const {

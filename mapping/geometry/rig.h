@@ -41,6 +41,17 @@ struct CameraModel {
   friend bool operator!=(const CameraModel& a, const CameraModel& b) { return !(a == b); }
 };
 
+/// The part of a sensor that a driver gives: CameraInfo's binning and region of interest, pixels of
+/// the whole sensor. 0: no binning; the whole width or height.
+struct SensorArea {
+  double binning_x = 0, binning_y = 0;
+  double x = 0, y = 0, width = 0, height = 0;
+};
+
+/// Returns the model of the area's own pixels. @param model of the whole sensor.
+/// @throws std::runtime_error for an area that is not in it.
+CameraModel cutTo(const SensorArea& area, CameraModel model);
+
 /// One camera of the rig. In imported recordings, frame `rig` is the frame of camera 0.
 struct RigCamera {
   CameraModel model;

@@ -4,7 +4,11 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
+#include <algorithm>
 #include <cmath>
+#include <stdexcept>
+
+#include "mapping/base/text.h"
 
 namespace efm {
 
@@ -43,6 +47,32 @@ std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Quaterniond& rotatio
   const double length = rotation.coeffs().stableNorm();
   if (!(std::abs(length - 1) <= kMaxError)) return std::nullopt;
   return Eigen::Quaterniond(rotation.coeffs() / length);
+}
+
+Rigid3 transformOf(const double* numbers, std::size_t count) {
+  NumberText error(6);
+  const double* const end = numbers + count;
+  const double* const wrong =
+      std::find_if_not(numbers, end, [](double n) { return std::isfinite(n); });
+  if (wrong != end) {
+    error << (count == 16           ? "matrix"
+              : wrong < numbers + 3 ? "position"
+                                    : "orientation")
+          << " = " << *wrong << ": expected a finite number";
+  } else if (count == 16) {
+    const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(numbers);
+    if (const auto T_a_b = transformNear(matrix)) return *T_a_b;
+    error << "a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001";
+  } else if (count == 7) {
+    const Eigen::Quaterniond quaternion(numbers[6], numbers[3], numbers[4], numbers[5]);
+    if (const auto rotation = rotationNear(quaternion))
+      return {*rotation, {numbers[0], numbers[1], numbers[2]}};
+    error << "qx qy qz qw of length " << quaternion.coeffs().stableNorm()
+          << ": expected a rotation, of length 1 within 1 %";
+  } else {
+    error << count << " numbers: expected 7, a position and a quaternion, or 16, a matrix";
+  }
+  throw std::runtime_error(error.str());
 }
 
 }  // namespace efm

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 namespace efm {
@@ -73,5 +75,16 @@ std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Matrix3d& R_a_b);
 std::optional<Rigid3> transformNear(const Eigen::Matrix4d& T_a_b);
 /// Returns the rotation of a quaternion whose length is 1 within 1 %; std::nullopt for others.
 std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Quaterniond& rotation);
+
+/// The position and the quaternion x y z w of a transform.
+using PoseNumbers = std::array<double, 7>;
+/// Returns the transform of 7 numbers, `PoseNumbers`, or of 16, a matrix row by row.
+/// @throws std::runtime_error for other counts, numbers that are not finite, and rotations that are
+/// not near enough, as above.
+Rigid3 transformOf(const double* numbers, std::size_t count);
+template <typename Numbers>
+Rigid3 transformOf(const Numbers& numbers) {
+  return transformOf(numbers.data(), numbers.size());
+}
 
 }  // namespace efm

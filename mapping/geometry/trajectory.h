@@ -7,12 +7,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <istream>
 #include <limits>
 #include <optional>
 #include <ostream>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "mapping/base/option.h"
@@ -147,25 +145,10 @@ class CameraMotion {
 };
 
 /// The text format of the TUM RGB-D benchmark for trajectories: a line `t tx ty tz qx qy qz qw` for
-/// each pose, in metres and decimal seconds. Blank lines and comments after `#` are skipped.
+/// each pose T_world_rig, in metres and decimal seconds.
 
-/// Reads the poses T_world_rig in the order of the file. Times are exact. Quaternions are
-/// normalised, because files have few digits; a length that differs from 1 by more than 1 % is an
-/// error.
-std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file);
-/// @param name name of the stream, for errors.
-std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name);
-
-/// Reads the poses of a recording from such a file. A file without a pose is an error.
-std::vector<StampedPose> readPosesFile(const std::filesystem::path& file);
-
-/// Parses the pose of a line.
-/// @param fields t tx ty tz qx qy qz qw.
-/// @param time_exponent unit of t as a power of ten, in seconds: -9 to 0.
-StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent = 0);
-
-/// Writes times with nine decimals and other numbers with 17 significant digits. Reading the file
-/// gives the same poses, up to the rounding of the normalisation.
+/// Writes times with nine decimals and other numbers with 17 significant digits: `readPoses` gives
+/// the same poses, up to the rounding of the normalisation.
 void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses);
 void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses);
 /// Writes the line of a pose.

@@ -84,7 +84,7 @@ void TrajectoryCheck::compareWithSameTime(const StampedPose& pose) {
 /// Looks whether the newest pose leaves the place of the pose before it for an earlier place.
 void TrajectoryCheck::lookForChange(const StampedPose& pose) {
   constexpr double kMinDistance = 0.02;
-  constexpr std::int64_t kMaxTimeNs = 500'000'000;  // between two poses of one place
+  constexpr std::int64_t kSamePlaceNs = 500'000'000;  // between two poses of one place
   constexpr std::size_t kMaxBodies = 8;             // with one pose each between two poses
   const StampedPose& before = last_.back();
   const double distance = distanceBetween(before, pose);
@@ -95,7 +95,7 @@ void TrajectoryCheck::lookForChange(const StampedPose& pose) {
   if (violence < 1) return;
   for (std::size_t i = last_.size() - 1; i-- > 0;) {
     const StampedPose& earlier = last_[i];
-    if (pose.t_ns - earlier.t_ns > kMaxTimeNs) return;
+    if (pose.t_ns - earlier.t_ns > kSamePlaceNs) return;
     if (distanceBetween(earlier, pose) < distance / 4) {
       last_change_ = distance;
       return count(before, last_number_, pose, changes_.of, changes_);

@@ -164,6 +164,11 @@ std::string errorText(const CLI::App& app, const CLI::ParseError& error) {
   return wrong_value ? text : text + "; see " + path + " --help";
 }
 
+void addTimeUnit(CLI::App& command, const std::string& name, std::string& unit,
+                 const std::string& help) {
+  command.add_option(name, unit, help)->check(oneOf({"s", "ms", "us", "ns"}));
+}
+
 void addSource(CLI::App& command, RecordingSource& source) {
   command
       .add_option("SOURCE", source.files,
@@ -204,16 +209,12 @@ void addSource(CLI::App& command, RecordingSource& source) {
           "fields "
           "or data sets in NumPy and HDF5: \"t=NAME x=NAME y=NAME p=NAME\"")
       ->type_name("COLUMNS");
-  command
-      .add_option("--time-unit", source.reader.time_unit,
-                  "The unit of times in text events, NumPy arrays and real times of HDF5 (default: "
-                  "found, else s)")
-      ->check(oneOf({"s", "ms", "us", "ns"}));
-  command
-      .add_option("--pose-time-unit", source.reader.pose_time_unit,
-                  "The unit of times in text poses without a header (default: found, else "
-                  "--time-unit for whole numbers, else s)")
-      ->check(oneOf({"s", "ms", "us", "ns"}));
+  addTimeUnit(command, "--time-unit", source.reader.time_unit,
+              "The unit of times in text events, NumPy arrays and real times of HDF5 (default: "
+              "found, else s)");
+  addTimeUnit(command, "--pose-time-unit", source.reader.pose_time_unit,
+              "The unit of times in text poses whose header names none (default: found, else "
+              "--time-unit for whole numbers, else s)");
   command
       .add_option_function<std::string>(
           "--sensor-size",

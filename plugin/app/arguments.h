@@ -50,6 +50,10 @@ void addSource(CLI::App& command, RecordingSource& source);
 /// Adds --t0, --t1 and --duration. @return --t0.
 CLI::Option* addTimeLimits(CLI::App& command, TimeArguments& times);
 
+/// Adds an option whose value is a unit of time.
+void addTimeUnit(CLI::App& command, const std::string& name, std::string& unit,
+                 const std::string& help);
+
 /// Adds an option whose value is a time of the recording.
 CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<TimeArgument>& time,
                      const std::string& help);

@@ -77,6 +77,7 @@ void addInfo(CLI::App& app, Run& run) {
   command.add_flag("--system", arguments->system,
                    "Print the processor and the kernels of the inner loops that it can run; "
                    "needs no recording");
+  command.add_flag("--json", arguments->json, "Print JSON instead of text");
   command.get_option("SOURCE")->required(false);
   command.parse_complete_callback([arguments] {
     if (!arguments->system && arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");

@@ -26,6 +26,7 @@ struct InfoArguments {
   TimeArguments times;
   bool strict = false;  ///< True: a warning is an error.
   bool system = false;  ///< Also print the processor and its kernels; a recording is optional.
+  bool json = false;    ///< Print `infoJson`.
   Verbosity verbosity = Verbosity::kNormal;
 };
 
@@ -120,7 +121,8 @@ int runDepth(const DepthArguments& arguments);
 struct SimulateArguments {
   std::string preset;  ///< Empty: `scene`, `trajectory` and `calibration` are used.
   std::string scene;
-  std::filesystem::path trajectory;   ///< TUM, T_world_cam0.
+  std::filesystem::path trajectory;   ///< See `readPoses`: T_world_cam0.
+  std::string time_unit;              ///< Of its times, where the file names none.
   std::filesystem::path calibration;  ///< Kalibr camera chain.
   std::optional<std::int64_t> start_ns;
   std::optional<double> duration_s;

@@ -152,7 +152,7 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
   CLI::App& command = *evaluate.add_subcommand(
       "trajectory",
       "Absolute and relative errors of poses, as evo and rpg_trajectory_evaluation define them. "
-      "Trajectories are TUM files: t tx ty tz qx qy qz qw");
+      "Trajectories are files that `map --poses` reads");
   auto arguments = argumentsOf(command, run, runEvaluateTrajectory);
   command
       .add_option(
@@ -177,6 +177,10 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
                   "origin (the first poses coincide) or none")
       ->check(oneOf({"se3", "origin", "none"}))
       ->capture_default_str();
+  addTimeUnit(command, "--pose-time-unit", arguments->options.estimate_time_unit,
+              "Unit of EST's times, where the file names none");
+  addTimeUnit(command, "--truth-time-unit", arguments->options.truth_time_unit,
+              "Unit of GT's times, where the file names none");
   addList(command, "--lengths", arguments->lengths_m,
           "Relative errors over sub-trajectories of these lengths in metres; without --lengths, "
           "--deltas and --frames: over 10 to 50 % of the true length, 1 second and 1 frame");

@@ -163,7 +163,7 @@ int runExport(const ExportArguments& arguments) {
     });
   }
   if (!damage && events == 0) rejectLimitsWithoutEvents(source.limits, *recording);
-  for (const TruthDepth& truth : openTruth(source)) {
+  for (const TimedFile& truth : openTruth(source)) {
     interruption.check();
     if (source.limits.contain(truth.t_ns)) writer->addTruth(truth.t_ns, truth.file);
   }

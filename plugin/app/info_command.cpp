@@ -168,7 +168,11 @@ int runInfo(const InfoArguments& arguments) {
     Progress progress("reading", arguments.verbosity);
     info = readInfo(source, [&](double fraction) { progress.show(fraction); });
   }
-  if (arguments.verbosity != Verbosity::kQuiet) print(info);
+  if (arguments.json) {
+    fmt::print("{}\n", infoJson(info));
+  } else if (arguments.verbosity != Verbosity::kQuiet) {
+    print(info);
+  }
   if (info.error) std::rethrow_exception(info.error);
   printWarnings(info.warnings);
   printWarnings(info.notes, "note");

@@ -16,7 +16,8 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/program.h"
 #include "plugin/playback/progress.h"
-#include "plugin/recordings/calibration/calibration_formats.h"
+#include "plugin/recordings/calibration/calibration_file.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "tracking_stub/presets/presets.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -68,9 +69,18 @@ Simulation makeOnTrajectory(const SimulateArguments& arguments) {
   options.start_ns = arguments.start_ns;
   options.duration_s = arguments.duration_s;
   options.seed = arguments.seed;
-  const std::vector<StampedPose> poses = readTumTrajectory(arguments.trajectory);
-  Rig rig = readCamchain(arguments.calibration);
-  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // they share a clock
+  ReaderOptions reader;
+  reader.pose_time_unit = arguments.time_unit;
+  const std::vector<StampedPose> poses = readPoses(arguments.trajectory, reader);
+  const Calibration calibration = readCalibration(arguments.calibration);
+  Rig rig = calibration.rig;
+  for (RigCamera& camera : rig.cameras) {
+    camera.time_offset_ns = 0;  // they share a clock
+    if (camera.model.width > 0) continue;
+    throw std::runtime_error(calibration.file.string() +
+                             ": no size of the sensor: expected a calibration that has it, as a "
+                             "camera chain or nine numbers and width height");
+  }
   try {
     return makeTrajectorySimulation(options, poses, rig);
   } catch (const std::invalid_argument& error) {
@@ -156,13 +166,17 @@ void addSimulate(CLI::App& app, Run& run) {
                            ->excludes(preset);
   CLI::Option* trajectory =
       command
-          .add_option("--trajectory", arguments->trajectory,
-                      "Poses of camera 0 (z forward), TUM format; the truth is this trajectory, "
-                      "low-pass filtered at 10 Hz")
-          ->type_name("TUM.txt");
-  CLI::Option* calibration =
-      command.add_option("--calibration", arguments->calibration, "The rig, as Kalibr writes it")
-          ->type_name("CAMCHAIN.yaml");
+          .add_option(
+              "--trajectory", arguments->trajectory,
+              "Poses of camera 0 (z forward), a file that `map --poses` reads; the truth is "
+              "this trajectory, low-pass filtered at 10 Hz")
+          ->type_name("POSES");
+  addTimeUnit(command, "--pose-time-unit", arguments->time_unit,
+              "The unit of the trajectory's times, where the file names none");
+  CLI::Option* calibration = command
+                                 .add_option("--calibration", arguments->calibration,
+                                             "The rig, a file that `map --calibration` reads")
+                                 ->type_name("FILE");
   trajectory->needs(scene);
   calibration->needs(scene);
   scene->needs(trajectory)->needs(calibration);

@@ -243,27 +243,6 @@ std::vector<TimedFile> indexIn(const fs::path& folder) {
 
 }  // namespace
 
-std::vector<TimedFile> timedFilesIn(const fs::path& list) {
-  std::ifstream file(list);
-  if (!file) throw std::runtime_error("cannot read " + list.string());
-  std::vector<TimedFile> files;
-  int number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    std::istringstream fields(line.substr(0, line.find('#')));
-    std::string time;
-    std::string name;
-    if (!(fields >> time)) continue;
-    const auto t_ns = parseSeconds(time);
-    if (!t_ns || !(fields >> name)) {
-      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time in seconds and a file",
-                                           list.string(), number, inQuotes(line)));
-    }
-    files.push_back({*t_ns, list.parent_path() / name});
-  }
-  return files;
-}
-
 std::vector<TimedFile> depthSeries(const fs::path& folder, DepthSeriesRole role) {
   const bool truth = role == DepthSeriesRole::kTruth;
   std::vector<TimedFile> maps = truth ? indexIn(folder) : keyframesIn(folder);

@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "plugin/recordings/text/dataset_folder.h"
+
 namespace efm {
 
 /// Reads a depth map: a float32 TIFF of one channel, a grey PFM or a NumPy array of two dimensions
@@ -26,15 +28,6 @@ cv::Mat1b readMaskFile(const std::filesystem::path& file);
 /// Returns the first of these files that a folder has, and any other path unchanged.
 std::filesystem::path fileInFolder(const std::filesystem::path& path,
                                    std::initializer_list<const char*> names);
-
-struct TimedFile {
-  std::int64_t t_ns = 0;
-  std::filesystem::path file;
-};
-
-/// Reads a list of files, in its order: a line is `t file`, with t in decimal seconds and the file
-/// relative to the list's folder. A # begins a comment.
-std::vector<TimedFile> timedFilesIn(const std::filesystem::path& list);
 
 /// Selects the estimated or the true depth maps of a folder that may hold both.
 enum class DepthSeriesRole { kEstimate, kTruth };

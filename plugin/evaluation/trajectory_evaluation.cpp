@@ -14,7 +14,7 @@
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/evaluation_text.h"
-#include "plugin/recordings/text/pose_text.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "plugin/results/pictures/picture.h"
 
@@ -128,10 +128,12 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
   const auto estimate_file =
       fileInFolder(estimated, {"trajectory.txt", "poses.txt", "groundtruth.txt"});
   const auto truth_file = fileInFolder(truth, {"poses.txt", "groundtruth.txt"});
-  const std::vector<StampedPose> estimate =
-      requirePoses(readPoseText(estimate_file, {}), estimate_file);
-  const std::vector<StampedPose> true_poses =
-      requirePoses(readPoseText(truth_file, {}), truth_file);
+  ReaderOptions reader;
+  reader.pose_time_unit = options.estimate_time_unit;
+  const std::vector<StampedPose> estimate = readPoses(estimate_file, reader);
+  reader.pose_time_unit = options.truth_time_unit;
+  reader.pose_unit_option = "--truth-time-unit";
+  const std::vector<StampedPose> true_poses = readPoses(truth_file, reader);
 
   TrajectoryEvaluation evaluation;
   evaluation.estimate_file = estimate_file;

@@ -27,6 +27,10 @@ struct TrajectoryEvaluationOptions {
   /// Spacings of the relative errors. Empty: one frame, one second, and 10 to 50 % of the true
   /// length, as in rpg_trajectory_evaluation.
   std::vector<RelativeSpacing> spacings;
+  /// Units of times without one in the file of the estimate and of the truth: s, ms, us or ns.
+  /// Empty: found.
+  std::string estimate_time_unit{};
+  std::string truth_time_unit{};
 };
 
 /// The relative errors over one spacing. The count is 0 if no pair of poses has this spacing.
@@ -50,8 +54,8 @@ struct TrajectoryEvaluation {
   std::vector<EvaluatedSpacing> relative;
 };
 
-/// Compares a trajectory with the truth. Both are TUM files. A folder of a run stands for its
-/// trajectory.txt, a folder of a dataset for its poses.txt or groundtruth.txt.
+/// Compares a trajectory with the truth. Both are files that `readPoses` reads. A folder of a run
+/// stands for its trajectory.txt, a folder of a dataset for its poses.txt or groundtruth.txt.
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options);

@@ -176,13 +176,7 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
   constexpr double kMaxChange = 0.08;  // of reliable depths
   constexpr double kMaxLeverM = 20;
   PoseVerdict verdict;
-  if (lever_m > kMaxLeverM) {  // further checks would blame the poses
-    addWarning(verdict.warnings, "long-lever",
-               "the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
-               "translation of T_body_rig in metres (--hand-eye)?",
-               lever_m, kMaxLeverM);
-    return verdict;
-  }
+  if (lever_m > kMaxLeverM) return verdict;  // long-lever: further checks would blame the poses
   for (const RigCamera& camera : rig.cameras) {
     for (const Warning& warning : calibrationWarnings(0, camera.model)) {
       if (warning.name != "principal-point") return verdict;  // no pose explains such rays

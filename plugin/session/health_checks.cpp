@@ -112,6 +112,7 @@ void checkShift(const Findings& findings, Warnings& warnings) {
 
 void checkSpeeds(const Findings& findings, Warnings& warnings) {
   constexpr double kMaxSpeed = 50;     // m/s: 180 km/h
+  constexpr double kMaxLeverM = 3;     // a car's; a camera's lever of 3 cm is 3 in centimetres
   constexpr double kMaxRotation = 20;  // rad/s: three turns a second; gyroscopes end at 35
   const PoseStatistics* const used = findings.recording.usedPoses();
   if (!used) return;
@@ -121,6 +122,12 @@ void checkSpeeds(const Findings& findings, Warnings& warnings) {
                "positions in metres, times in seconds and the columns in order? Or "
                "the tracker jumps (--poses)",
                used->max_speed, kMaxSpeed);
+  }
+  if (used->lever_m > kMaxLeverM) {
+    addWarning(warnings, "long-lever",
+               "the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
+               "translation of T_body_rig in metres (--hand-eye)?",
+               used->lever_m, kMaxLeverM);
   }
   if (used->max_rotation_rate > kMaxRotation) {
     addWarning(warnings, "rotation-rate",

@@ -23,6 +23,7 @@ constexpr OptionWords kOptions[] = {
     {"calibration", {"Overrides::calibration=", "calibration=", "addCamera", "add_camera"}},
     {"hand-eye", {"Overrides::hand_eye=", "hand_eye=", "rig.hand_eye=", "rig.hand_eye="}},
     {"pose-time-unit", {"Overrides::pose_time_unit=", "pose_time_unit=", "addPose", "time_unit="}},
+    {"truth-time-unit", {"truth_time_unit", "truth_time_unit=", "addPose", "time_unit="}},
     {"time-unit", {"Overrides::time_unit=", "time_unit=", "addEvents", "time_unit="}},
     {"event-columns", {"Overrides::event_columns=", "event_columns=", "addEvents", "add_events"}},
     {"topics", {"Overrides::topics=", "topics=", "topics", "topics"}},

@@ -63,9 +63,12 @@ std::string mirrorText(const PixelChange& pixels) {
            "(--event-columns)";
   }
   return fmt::format(
-      "{} mirrored; a driver or a mirror turned the picture over, which must be "
-      "undone in the recording: no calibration describes it",
-      pixels.mirror_x ? "columns" : "rows");
+      "{0} mirrored; either a driver or a mirror turned the picture over, which must be undone in "
+      "the recording, because no calibration describes it; or the poses are of a left-handed frame "
+      "(Unity, Unreal, AirSim), whose {1} axis must be turned: {1}, q{2} and q{3} with the other "
+      "sign",
+      pixels.mirror_x ? "columns" : "rows", pixels.mirror_x ? "x" : "y",
+      pixels.mirror_x ? "y" : "x", "z");
 }
 
 /// Returns the intrinsics that fit the pixels of the events, of the cameras whose pixels differ.

@@ -200,6 +200,8 @@ void RecordingStatistics::addPose(const PoseSample& pose) {
   const std::int64_t t_ns = trajectoryTime(pose.t_ns, 0);
   const auto [entry, is_new] = pose_sources_.try_emplace(pose.source);
   if (is_new) entry->second.order = pose_sources_.size();
+  const Rigid3& T_body_rig = options_.T_body_rig ? *options_.T_body_rig : pose.T_body_rig;
+  entry->second.lever_m = std::max(entry->second.lever_m, T_body_rig.translation.norm());
   entry->second.add({t_ns, rigPose(pose, options_.T_body_rig)},
                     durationFromSeconds(options_.window_s));
   countAroundPose(t_ns);

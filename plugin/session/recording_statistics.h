@@ -102,6 +102,7 @@ struct PoseStatistics {
   double path_m = 0;
   double max_speed = 0;          ///< m/s, over at least 10 ms.
   double max_rotation_rate = 0;  ///< rad/s, over at least 10 ms.
+  double lever_m = 0;            ///< Largest distance from the tracked body to the rig.
   double max_shift_m = 0;        ///< Largest distance from the first pose of a window.
   double max_rotation_rad = 0;   ///< Largest rotation from the first pose of a window.
   PoseMotion motion;

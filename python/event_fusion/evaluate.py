@@ -199,19 +199,23 @@ def trajectory(
     *,
     alignment: str = "se3",
     max_difference: float = 0.01,
+    pose_time_unit: str = "",
+    truth_time_unit: str = "",
 ) -> dict[str, Any]:
     """Compare a trajectory with the truth: absolute and relative pose errors.
 
     Parameters
     ----------
     estimate : path, Map, Mapper, or (times, poses)
-        A TUM file; or times (n,) in nanoseconds and matrices (n, 4, 4).
+        A file that `open` reads as poses; or times (n,) in nanoseconds and matrices (n, 4, 4).
     truth : path, Recording, or (times, poses)
         As the estimate.
     alignment : {'se3', 'origin', 'none'}
         How the estimate is aligned with the truth.
     max_difference : float
         Maximum time between the two poses of a pair, seconds.
+    pose_time_unit, truth_time_unit : {'', 's', 'ms', 'us', 'ns'}
+        Unit of the times in the file of the estimate and of the truth, where it names none. Default: found.
 
     Returns
     -------
@@ -227,6 +231,6 @@ def trajectory(
         estimated = _pose_file(estimate, pathlib.Path(folder, "estimate.txt"))
         true = _pose_file(truth, pathlib.Path(folder, "truth.txt"))
         errors: dict[str, Any] = json.loads(
-            _engine.trajectory_errors(estimated, true, alignment, max_difference)
+            _engine.trajectory_errors(estimated, true, alignment, max_difference, pose_time_unit, truth_time_unit)
         )
     return errors

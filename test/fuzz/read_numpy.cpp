@@ -13,7 +13,7 @@
 #include "plugin/recordings/columns/event_arrays.h"
 #include "plugin/recordings/columns/npy_array.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/files/file_content.h"
 #include "test/fuzz/reading.h"
 
 namespace {

@@ -159,6 +159,8 @@ def main(corpus=HERE / "corpus"):
                 words_at = data.index(b"\n", words_at) + 1
             if kind != "evt21_legacy":
                 write(corpus, kind, "words", data[words_at:])
+        words = b"".join(struct.pack("<II", 10 * i, i % 320 | i % 180 << 14 | i % 2 << 28) for i in range(50))
+        write(corpus, "dat", "words", b"\x0c\x08" + words)
         run("write_aedat4.py", scratch / "dataset", scratch / "aedat4")
         for kind in ("none", "lz4", "zstd"):
             write(corpus, "aedat4", kind, (scratch / "aedat4" / f"{kind}.aedat4").read_bytes())

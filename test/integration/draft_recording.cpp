@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/integration/mistakes.h"
 
 #include <fmt/format.h>
@@ -54,7 +55,7 @@ DraftRecording readDraft(const fs::path& folder) {
       events.insert(events.end(), block.begin(), block.end());
     }
   }
-  draft.poses = readPosesFile(folder / "poses.txt");
+  draft.poses = readPoses(folder / "poses.txt");
   draft.camchain = readText(folder / "camchain.yaml");
   return draft;
 }

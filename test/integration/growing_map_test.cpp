@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/integration/letter_f.h"
 #include "test/plugin/program_test.h"
 
@@ -46,7 +47,7 @@ class GrowingMap : public ProgramTest {
     return most - least > 80;
   }
   std::vector<StampedPose> posesOfMap() const {
-    return readTumTrajectory(folder() / "out" / "trajectory.txt");
+    return readPoses(folder() / "out" / "trajectory.txt");
   }
 
   /// Reads the screen of Xvfb from its file: a header of big-endian words, then 4 bytes per pixel.

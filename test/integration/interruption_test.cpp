@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "maps/io/point_cloud_file.h"
 #include "test/plugin/app/app_test.h"
 
@@ -70,7 +71,7 @@ class Interruption : public AppTest {
       expected.insert({"keyframes", "map.html", "map.pcd", "map.png", "map.simplemap",
                        "overview.png", "trajectory.txt"});
       if (report.contains("refinement")) expected.insert("trajectory_tracker.txt");
-      const auto poses = readTumTrajectory(out() / "trajectory.txt");
+      const auto poses = readPoses(out() / "trajectory.txt");
       EXPECT_EQ(poses.size(), keyframes);
       for (const StampedPose& pose : poses) {
         const std::string folder = "keyframes/" + formatSeconds(pose.t_ns);

@@ -276,6 +276,7 @@ ERRORS = {
     "a wrong option of a map": (lambda: ef.map(ef.open(DESK), {"dsi.num_planes": -3}), ValueError, "num_planes"),
     "no truth": (lambda: ef.evaluate.true_depth(DESK, 7), OSError, "7 ns"),
     "no cloud": (lambda: ef.evaluate.map(np.zeros(3), DESK), ValueError, r"\(3,\)"),
+    "an unknown unit": (lambda: ef.evaluate.trajectory(DESK, DESK, truth_time_unit="m"), ValueError, "s, ms, us, ns"),
     "an unknown alignment": (lambda: ef.evaluate.trajectory(DESK, DESK, alignment="sim3"), ValueError, "se3"),
     "a fraction of a nanosecond": (lambda: ef.events([1], [1], [1], [0.5]), ValueError, r"t\[0\] = 0.5: .*time_unit='s'"),
     "a time beyond 64 bits": (lambda: ef.events([1], [1], [1], [10**12], "s"), ValueError, r"t\[0\]"),
@@ -557,6 +558,13 @@ def test_errors_are_those_of_the_program(made, desk, folder, tmp_path):
     for points in (made, np.stack([made.points[axis] for axis in "xyz"], 1)):
         assert ef.evaluate.map(points, desk)["accuracy"] == of_map["accuracy"]
     assert ef.evaluate.trajectory(made, desk)["pairs"] == of_path["pairs"]
+    poses = np.loadtxt(os.path.join(DESK, "poses.txt"))
+    rows = "".join(f"{round(1e9 * row[0])},{','.join(map(repr, row[1:]))}\n" for row in poses.tolist())
+    (tmp_path / "ns.csv").write_text("timestamp,x,y,z,qx,qy,qz,qw\n" + rows)
+    with pytest.raises(OSError, match="truth_time_unit='ns'"):
+        ef.evaluate.trajectory(folder, tmp_path / "ns.csv")
+    in_ns = ef.evaluate.trajectory(folder, tmp_path / "ns.csv", truth_time_unit="ns")
+    assert in_ns["ate"] == of_path["ate"]
     keyframe = made.keyframes[0]
     truth = ef.evaluate.true_depth(desk, keyframe.t)
     np.save(tmp_path / "truth.npy", truth)

@@ -373,7 +373,7 @@ std::string readPaths(const RosTopic& topic, std::vector<StampedPose>& poses) {
   });
   for (const auto& [t_ns, numbers] : by_time) {
     try {
-      poses.push_back({t_ns, rigidOf(numbers)});
+      poses.push_back({t_ns, transformOf(numbers)});
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}: {}: pose of {}: {}",
                                            topic.parts.front().bag->file().string(), topic.name,

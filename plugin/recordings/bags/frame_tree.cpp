@@ -18,7 +18,7 @@ constexpr const char* kArrow = "->";
 /// @throws std::runtime_error naming the frames and the time of wrong numbers.
 Rigid3 rigidAt(const FrameTransform& transform) {
   try {
-    return rigidOf(transform.numbers);
+    return transformOf(transform.numbers);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("{}->{} of {}: {}", transform.parent, transform.child,
                                          formatSeconds(transform.t_ns), error.what()));

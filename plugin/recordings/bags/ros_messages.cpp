@@ -299,21 +299,6 @@ void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>
   });
 }
 
-Rigid3 rigidOf(const PoseNumbers& numbers) {
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (std::isfinite(numbers[i])) continue;
-    throw std::runtime_error(fmt::format("{} = {}: expected a finite number",
-                                         i < 3 ? "position" : "orientation", numbers[i]));
-  }
-  const Eigen::Quaterniond quaternion(numbers[6], numbers[3], numbers[4], numbers[5]);
-  if (const auto rotation = rotationNear(quaternion)) {
-    return {*rotation, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])};
-  }
-  throw std::runtime_error(
-      fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation",
-                  quaternion.coeffs().stableNorm()));
-}
-
 MessageFrames framesOf(const BagMessage& message, RosType type) {
   MessageFields fields(message);
   MessageFrames frames;
@@ -340,14 +325,14 @@ std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type) {
     std::int64_t stamp_ns;
     std::vector<StampedPose> poses;
     for (const PathPose& pose : decodePath(message, stamp_ns)) {
-      poses.push_back({pose.t_ns, rigidOf(pose.numbers)});
+      poses.push_back({pose.t_ns, transformOf(pose.numbers)});
     }
     return poses;
   }
   MessageFields fields(message);
   const std::int64_t t_ns = fields.header();
   if (type == RosType::kTransform || type == RosType::kOdometry) fields.text();  // child_frame_id
-  return {{t_ns, rigidOf(takePose(fields))}};
+  return {{t_ns, transformOf(takePose(fields))}};
 }
 
 std::vector<FrameTransform> decodeTransforms(const BagMessage& message) {
@@ -393,7 +378,16 @@ CameraModel decodeCameraInfo(const BagMessage& message) {
     throw std::runtime_error(fmt::format(
         "distortion_model = {}: expected plumb_bob, equidistant or fisheye", inQuotes(name)));
   }
-  return model;
+  if (model.fx == 0) return model;
+  for (int k = 0; k < 9 + 12; ++k) fields.number<double>();  // R and P
+  SensorArea area;
+  area.binning_x = fields.number<std::uint32_t>();
+  area.binning_y = fields.number<std::uint32_t>();
+  area.x = fields.number<std::uint32_t>();
+  area.y = fields.number<std::uint32_t>();
+  area.height = fields.number<std::uint32_t>();
+  area.width = fields.number<std::uint32_t>();
+  return cutTo(area, std::move(model));
 }
 
 }  // namespace efm

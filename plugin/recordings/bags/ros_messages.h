@@ -89,11 +89,6 @@ MessageFrames framesOf(const BagMessage& message, RosType type);
 /// of length 1 within 1 %.
 std::vector<StampedPose> decodePoses(const BagMessage& message, RosType type);
 
-/// Position and quaternion x y z w.
-using PoseNumbers = std::array<double, 7>;
-/// @throws std::runtime_error as `decodePoses`.
-Rigid3 rigidOf(const PoseNumbers& numbers);
-
 struct PathPose {
   std::int64_t t_ns;
   PoseNumbers numbers;  ///< May be wrong.

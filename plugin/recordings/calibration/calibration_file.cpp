@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -19,6 +21,7 @@
 #include "maps/io/npy_header.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "plugin/recordings/calibration/yaml_entry.h"
+#include "plugin/recordings/files/file_content.h"
 
 namespace efm {
 namespace {
@@ -55,42 +58,8 @@ std::string firstWord(const std::string& text) {
   return word;
 }
 
-Calibration readYamlCalibration(const std::filesystem::path& file) {
-  const YAML::Node root = loadYaml(file.string());
-  if (root.IsMap()) {
-    const YamlEntry entry(file.string(), "", root);
-    if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
-    if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
-    if (entry.has("value0")) return readTumVieCalibration(entry, file);
-    if (entry.has("cameras")) return {file, readDvCameras(entry)};
-    if (const auto camera = readOneCamera(entry)) return {file, {{{*camera, {}, 0}}}};
-  }
-  throw std::runtime_error(
-      fmt::format("{}: not a calibration: expected {}", file.string(), kCalibrationFiles));
-}
-
-std::vector<double> readNumbers(const std::filesystem::path& file,
-                                std::string_view blanks = kLineBlanks) {
-  std::ifstream stream(file);
-  std::vector<double> numbers;
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
-    for (const std::string_view word : splitWords(content.substr(0, content.find('#')), blanks)) {
-      const std::optional<double> value = parseFinite(word);
-      if (!value) {
-        throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),
-                                             number, inQuotes(word)));
-      }
-      numbers.push_back(*value);
-    }
-  }
-  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
-  return numbers;
-}
-
-/// Returns the numbers of an array, row after row.
-std::vector<double> numbersInNpy(const std::string& text, const std::filesystem::path& file) {
+/// Returns the numbers of an array, row after row. @param text of a .npy file.
+std::vector<double> numbersInNpy(const std::string& text, const std::string& name) {
   std::vector<double> numbers;
   try {
     const NpyHeader header = parseNpyHeader(text);
@@ -101,7 +70,79 @@ std::vector<double> numbersInNpy(const std::string& text, const std::filesystem:
       numbers.push_back(numberAt(&text[at], header.type, header.big_endian));
     }
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
+  }
+  return numbers;
+}
+
+/// Returns the arrays of a .npz file that have numbers, by their names in lower case.
+std::map<std::string, std::vector<double>> arraysIn(const std::filesystem::path& file) {
+  constexpr std::size_t kMaxBytes = 100'000;
+  std::map<std::string, std::vector<double>> arrays;
+  for (const std::string& member : membersOf(file)) {
+    std::string name = std::filesystem::path(member).stem().string();
+    for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    try {
+      arrays[name] = numbersInNpy(firstContentOf(file, kMaxBytes, member), member);
+    } catch (const std::runtime_error&) {  // Python objects, as the rotations of OpenCV's tutorial
+    }
+  }
+  return arrays;
+}
+
+/// Reads the camera's matrix and the coefficients of a lens from a .npz file.
+Calibration readCameraArrays(const std::filesystem::path& file) {
+  constexpr std::pair<const char*, const char*> kNames[] = {
+      {"mtx", " mtx k camera_matrix cameramatrix matrix intrinsic intrinsics "},
+      {"dist", " dist d dist_coeffs distcoeffs distortion distortion_coefficients "}};
+  YAML::Node node(YAML::NodeType::Map);
+  for (const auto& [array, numbers] : arraysIn(file)) {
+    for (const auto& [key, names] : kNames) {
+      if (std::string_view(names).find(" " + array + " ") == std::string_view::npos) continue;
+      for (const double number : numbers) node[key].push_back(fmt::format("{}", number));
+    }
+  }
+  if (!node["mtx"] || !node["dist"]) {
+    throw std::runtime_error(file.string() +
+                             ": expected arrays mtx, 3 x 3, and dist, as OpenCV's tutorial saves");
+  }
+  if (node["dist"].size() == 4) {
+    throw std::runtime_error(
+        file.string() +
+        ": four coefficients are of a radtan or of a fisheye lens: expected five (k1 k2 p1 p2 0), "
+        "or YAML of a Kalibr camera chain with distortion_model: equidistant");
+  }
+  return {file, {{{*readOneCamera(YamlEntry(file.string(), "", node)), {}, 0}}}};
+}
+
+Calibration readYamlCalibration(const std::filesystem::path& file) {
+  const YAML::Node root = loadYaml(file.string());
+  if (root.IsMap()) {
+    const YamlEntry entry(file.string(), "", root);
+    if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
+    if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
+    if (entry.has("value0")) return readBasaltCalibration(entry, file);
+    if (entry.has("cameras")) return {file, readDvCameras(entry)};
+    if (const auto camera = readOneCamera(entry)) return {file, {{{*camera, {}, 0}}}};
+  }
+  throw std::runtime_error(
+      fmt::format("{}: not a calibration: expected {}", file.string(), kCalibrationFiles));
+}
+
+/// Returns the numbers of a text. @param blanks separate them.
+std::vector<double> numbersIn(std::string_view text, const std::filesystem::path& file,
+                              std::string_view blanks = kLineBlanks) {
+  std::vector<double> numbers;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::string_view line = takeLine(text);
+    for (const std::string_view word : splitWords(line.substr(0, line.find('#')), blanks)) {
+      if (const std::optional<double> value = parseFinite(word)) {
+        numbers.push_back(*value);
+        continue;
+      }
+      throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),
+                                           number, inQuotes(word)));
+    }
   }
   return numbers;
 }
@@ -171,20 +212,23 @@ void Calibration::requireLike(const Rig& recorded) const {
 Calibration readCalibration(const std::filesystem::path& file) {
   const std::string text = readText(file);
   if (looksLikeIni(text)) return {file, readMrptCameras(text, file)};
+  if (text.compare(0, 2, "PK") == 0) return readCameraArrays(file);
   if (!parseNumber<double>(firstWord(text))) return readYamlCalibration(file);
   return readUzhCalibration(file);
 }
 
 Calibration readUzhCalibration(const std::filesystem::path& file) {
-  const std::vector<double> numbers = readNumbers(file);
+  const std::vector<double> numbers = numbersIn(readText(file), file);
   const bool sized = numbers.size() == 11;
   if (numbers.size() != 9 && !sized) {
     throw std::runtime_error(
         fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3, or width height, too",
                     file.string(), numbers.size()));
   }
-  CameraModel model = radtanLens(file, {numbers.begin(), numbers.begin() + 4},
-                                 {numbers.begin() + 4, numbers.begin() + 9});
+  const std::vector<double>& n = numbers;
+  CameraModel model = !sized && isCameraMatrix(n)
+                          ? radtanLens(file, {n[0], n[4], n[2], n[5]}, std::vector<double>(5))
+                          : radtanLens(file, n, {n.begin() + 4, n.begin() + 9});
   if (!sized) return {file, {{{model, {}, 0}}}};
   for (const double side : {numbers[9], numbers[10]}) {
     if (side >= 1 && side <= 65535 && std::floor(side) == side) continue;
@@ -211,34 +255,40 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 }
 
 Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration) {
-  constexpr const char* kKey = "T_body_rig";
   constexpr const char* kExpected =
       "expected YAML, T_body_rig: 4 rows of 4 numbers, from the rig's frame to that of the tracked "
-      "body; these numbers as text or .npy; a Kalibr camera chain with T_cam_imu, easy_handeye's "
-      "result, DSEC's "
-      "cam_to_lidar.yaml, or TUM-VIE's mocap-imu-calibration*.json";
+      "body; these numbers, or x y z qx qy qz qw, as text, .npy or .npz; a Kalibr camera chain "
+      "with T_cam_imu, results of easy_handeye, OpenVINS or VINS, DSEC's cam_to_lidar.yaml, or "
+      "TUM-VIE's mocap-imu-calibration*.json";
   const std::string text = readText(file);
-  if (text.compare(0, 2, "PK") == 0) {
-    throw std::runtime_error(
-        fmt::format("{}: an archive, as .npz of NumPy: {}", file.string(), kExpected));
+  const bool npy = looksLikeNpy(text) || text.compare(0, 2, "PK") == 0;
+  std::vector<double> numbers;
+  if (looksLikeNpy(text)) {
+    numbers = numbersInNpy(text, file.string());
+  } else if (npy) {
+    for (const auto& [name, array] : arraysIn(file)) {
+      if (array.size() != 16 && array.size() != 7) continue;
+      if (!numbers.empty())
+        throw std::runtime_error(file.string() + ": two transforms: expected one");
+      numbers = array;
+    }
+  } else if (text.find_first_of(":{<") == std::string::npos) {
+    numbers = numbersIn(text, file, " \t\r,;[]");
   }
-  const bool npy = looksLikeNpy(text);
-  const bool only_numbers = text.find_first_of(":{<") == std::string::npos;
-  const std::vector<double> numbers = npy            ? numbersInNpy(text, file)
-                                      : only_numbers ? readNumbers(file, " \t\r,;[]")
-                                                     : std::vector<double>();
-  if (numbers.size() == 16) {
-    const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(numbers.data());
-    if (const auto T_body_rig = transformNear(matrix)) return *T_body_rig;
-    throw std::runtime_error(
-        file.string() +
-        ": a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001");
+  if (numbers.size() == 7 || numbers.size() == 16) {
+    try {
+      return transformOf(numbers);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    }
   }
   const YAML::Node root = npy ? YAML::Node() : loadYaml(file.string());
   if (root.IsMap()) {
     const YamlEntry entry(file.string(), "", root);
-    if (entry.has(kKey)) return entry.transform(kKey);
-    if (entry.has("transformation")) return readEasyHandEye(entry);
+    for (const char* key : {"T_body_rig", "body_T_cam0"}) {
+      if (entry.has(key)) return entry.transform(key);
+    }
+    if (entry.has("transformation") || entry.has("transform")) return readEasyHandEye(entry);
     if (entry.has("T_lidar_camRect1")) return readDsecHandEye(entry, calibration);
     if (entry.has("value0")) return readTumVieHandEye(entry, calibration);
     if (entry.has("cam0")) {

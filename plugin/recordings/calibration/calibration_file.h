@@ -53,19 +53,21 @@ struct Calibration {
 
 /// The files that `readCalibration` accepts, for errors.
 inline constexpr const char* kCalibrationFiles =
-    "a Kalibr camera chain, DSEC's cam_to_cam.yaml, TUM-VIE's camera-calibration*.json, "
-    "camera_info YAML of ROS, OpenCV or VINS, JSON of Metavision or dv-processing, an .ini file of "
-    "MRPT's camera calibration, or nine numbers, fx fy cx cy k1 k2 p1 p2 k3 (and width height)";
+    "a Kalibr camera chain, DSEC's cam_to_cam.yaml, JSON of Basalt or TUM-VIE, camera_info YAML of "
+    "ROS, OpenCV, VINS or DV, JSON of Metavision or dv-processing, an .ini file of MRPT's camera "
+    "calibration, .npz with mtx and dist, or nine numbers, fx fy cx cy k1 k2 p1 p2 k3 (and width "
+    "height)";
 
 /// Reads a calibration, whose kind is found by its content: see `readCamchain`,
-/// `readDsecCalibration`, `readTumVieCalibration`, `readOneCamera`, `readDvCameras`,
+/// `readDsecCalibration`, `readBasaltCalibration`, `readOneCamera`, `readDvCameras`,
 /// `readMrptCameras` and `readUzhCalibration`; the file of `readUzhCalibration` does not have the
 /// sensor's size.
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
 /// radtan with five coefficients, even if all are zero. Two more numbers are the sensor's width and
-/// height; without them, these are 0.
+/// height; without them, these are 0. The nine numbers of a matrix fx 0 cx, 0 fy cy, 0 0 1 are a
+/// lens without distortion.
 Calibration readUzhCalibration(const std::filesystem::path& file);
 
 /// Makes a radtan lens without the sensor's size, which is not in the file.
@@ -77,10 +79,12 @@ CameraModel radtanLens(const std::filesystem::path& file, const std::vector<doub
 /// Reads the rig's pose on the tracked body, whose poses a recording has:
 ///   T_world_rig = T_world_body * T_body_rig.
 /// The kind of the file is found by its content:
-/// - YAML with T_body_rig, 4x4, from the rig's frame to the body's; other keys are ignored.
-/// - Text or a NumPy array (.npy) of these numbers alone.
-/// - The result of easy_handeye with the eye on the hand: the body is the robot's effector.
-/// - A Kalibr camera chain: the body is the IMU, see `readCamchainImu`.
+/// - YAML with T_body_rig, 4x4, from the rig's frame to the body's, or body_T_cam0 (VINS); other
+///   keys are ignored.
+/// - Text or a NumPy array (.npy, .npz) of these numbers alone, or of seven, x y z qx qy qz qw.
+/// - The result of easy_handeye or easy_handeye2 with the eye on the hand: the body is the robot's
+///   effector.
+/// - A camera chain of Kalibr or OpenVINS: the body is the IMU, see `readCamchainImu`.
 /// - DSEC's cam_to_lidar.yaml: the body is the LiDAR, see `readDsecHandEye`.
 /// - TUM-VIE's mocap-imu-calibration*.json: the body is the marker, see `readTumVieHandEye`.
 ///   Rotations may have errors of 1e-3, because of rounding; the nearest rotation is taken.

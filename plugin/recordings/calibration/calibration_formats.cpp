@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -24,20 +25,26 @@
 namespace efm {
 namespace {
 
+constexpr const char* kOpenVins = "T_imu_cam";
 constexpr const char* kMatrix = "9, fx 0 cx 0 fy cy 0 0 1";
 constexpr const char* kSeven = "7, a position and a quaternion";
 
-/// The names that programs give to the models of lenses.
+/// The names that programs give to the models of lenses, in lower case.
 constexpr NamedChoice<DistortionModel> kLenses[] = {
     {DistortionModel::kRadtan, "radtan"},
     {DistortionModel::kRadtan, "plumb_bob"},
-    {DistortionModel::kRadtan, "radialTangential"},
-    {DistortionModel::kRadtan, "PINHOLE"},
+    {DistortionModel::kRadtan, "radialtangential"},
+    {DistortionModel::kRadtan, "pinhole"},
+    {DistortionModel::kRadtan, "opencv"},
+    {DistortionModel::kRadtan, "0"},  // fisheye_model
+    {DistortionModel::kRadtan, "false"},
     {DistortionModel::kEquidistant, "equidistant"},
     {DistortionModel::kEquidistant, "fisheye"},
     {DistortionModel::kEquidistant, "kannala_brandt"},
-    {DistortionModel::kEquidistant, "KANNALA_BRANDT"},
     {DistortionModel::kEquidistant, "kb4"},
+    {DistortionModel::kEquidistant, "opencv_fisheye"},
+    {DistortionModel::kEquidistant, "1"},
+    {DistortionModel::kEquidistant, "true"},
     {DistortionModel::kNone, "none"},
 };
 
@@ -56,7 +63,7 @@ constexpr CameraForm kKalibr = {"intrinsics",       false,   "resolution",
                                 "distortion_model", nullptr, "distortion_coeffs"};
 constexpr CameraForm kDsec = {"camera_matrix",    false,   "resolution",
                               "distortion_model", nullptr, "distortion_coeffs"};
-constexpr CameraForm kTumVie = {"intrinsics: fx fy cx cy", false, nullptr, "camera_type", nullptr,
+constexpr CameraForm kBasalt = {"intrinsics: fx fy cx cy", false, nullptr, "camera_type", nullptr,
                                 "intrinsics: k1 k2 k3 k4"};
 constexpr CameraForm kDv = {
     "focalLength principalPoint", false, "resolution", "distortionModel", nullptr,
@@ -70,8 +77,14 @@ constexpr std::pair<const char*, CameraForm> kOneCamera[] = {
     {"img_size", {"K", true, "img_size", "type", nullptr, "D"}},
     // camera_calibration of ROS, and OpenCV, whose files do not name the model
     {"camera_matrix",
-     {"camera_matrix: data", true, "image_width image_height", "distortion_model camera_model",
-      "plumb_bob", "distortion_coefficients: data"}},
+     {"camera_matrix", true, "image_width image_height",
+      "distortion_model camera_model fisheye_model use_fisheye_model", "plumb_bob",
+      "distortion_coefficients"}},
+    // The arrays of OpenCV's tutorial, see `readCalibration`
+    {"mtx", {"mtx", true, nullptr, "distortion_model", "plumb_bob", "dist"}},
+    // transforms.json of nerfstudio
+    {"k4", {"fl_x fl_y cx cy", false, "w h", "camera_model", "opencv_fisheye", "k1 k2 k3 k4"}},
+    {"fl_x", {"fl_x fl_y cx cy", false, "w h", "camera_model", "opencv", "k1 k2 p1 p2"}},
     // Messages of CameraInfo as text, of ROS 1 and 2
     {"K", {"K", true, "width height", "distortion_model", nullptr, "D"}},
     {"k", {"k", true, "width height", "distortion_model", nullptr, "d"}},
@@ -139,12 +152,14 @@ DistortionModel lensOf(const YamlEntry& entry, const CameraForm& form) {
   const bool is_default = key == keys.end() && form.default_lens != nullptr;
   const std::string& used = key == keys.end() ? keys.front() : *key;
   const std::string name = is_default ? form.default_lens : entry.text(used.c_str());
+  std::string lower;
+  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   for (const auto& lens : kLenses) {
-    if (lens.name == name) return lens.value;
+    if (lens.name == lower) return lens.value;
   }
   throw entry.failKey(used.c_str(), inQuotes(name),
                       "radtan (plumb_bob, radialTangential, PINHOLE), equidistant (fisheye, "
-                      "kannala_brandt, kb4) or none");
+                      "kannala_brandt, kb4) or none; another model is not read");
 }
 
 /// Reads a camera. Coefficients after the model's own must be 0.
@@ -175,8 +190,23 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
   while (model.coefficients.size() > most && model.coefficients.back() == 0) {
     model.coefficients.pop_back();
   }
+  if (entry.has("binning_x") || entry.has("roi")) {
+    const auto value = [](const YamlEntry& of, const char* key) {
+      return of.has(key) ? of.number(key) : 0;
+    };
+    SensorArea area{value(entry, "binning_x"), value(entry, "binning_y")};
+    if (entry.has("roi")) {
+      const YamlEntry roi = entry.section("roi");
+      area = {area.binning_x,         area.binning_y,      value(roi, "x_offset"),
+              value(roi, "y_offset"), value(roi, "width"), value(roi, "height")};
+    }
+    model = cutTo(area, model);
+  }
   try {
-    model.validate();
+    CameraModel sized = model;
+    if (form.size == nullptr && model.width == 0)
+      sized.width = sized.height = 1;  // not in the file
+    sized.validate();
   } catch (const std::invalid_argument& error) {
     throw entry.fail(error.what());
   }
@@ -185,11 +215,11 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
 
 /// @param v x y z qx qy qz qw.
 Rigid3 rigidFrom(const YamlEntry& entry, const std::vector<double>& v) {
-  const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
-  if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
-  throw entry.fail(
-      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %",
-                  numbers.coeffs().stableNorm()));
+  try {
+    return transformOf(v);
+  } catch (const std::runtime_error& error) {
+    throw entry.fail(error.what());
+  }
 }
 
 CameraModel readKalibrCamera(const YamlEntry& entry, const CameraForm& form) {
@@ -249,8 +279,12 @@ Rig readCamchain(const std::filesystem::path& file) {
     RigCamera camera;
     camera.model = readKalibrCamera(entry, kKalibr);
     if (n > 0) {
-      const Rigid3 T_cn_cnm1 = entry.transform("T_cn_cnm1");
-      camera.T_rig_cam = rig.cameras[n - 1].T_rig_cam * T_cn_cnm1.inverse();
+      const bool open_vins = entry.has(kOpenVins) && !entry.has("T_cn_cnm1");
+      camera.T_rig_cam =
+          open_vins
+              ? YamlEntry(file.string(), "cam0", root["cam0"]).transform(kOpenVins).inverse() *
+                    entry.transform(kOpenVins)
+              : rig.cameras[n - 1].T_rig_cam * entry.transform("T_cn_cnm1").inverse();
     }
     if (entry.has("timeshift_cam_imu") || !shifts_ns.empty()) {
       if (shifts_ns.size() != n) {
@@ -269,15 +303,17 @@ std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file) {
   const YAML::Node root = loadYaml(file.string());
   countCameras(file.string(), root);
   const YamlEntry cam0(file.string(), "cam0", root["cam0"]);
-  if (!cam0.has(kKey)) return std::nullopt;
-  return cam0.transform(kKey).inverse();
+  if (cam0.has(kKey)) return cam0.transform(kKey).inverse();
+  return cam0.has(kOpenVins) ? std::optional(cam0.transform(kOpenVins)) : std::nullopt;
 }
 
 std::optional<CameraModel> readOneCamera(const YamlEntry& root) {
   for (const auto& [found, form] : kOneCamera) {
     if (hasPlace(root, found)) return readCamera(root, form);
   }
-  return std::nullopt;
+  return root.onlyPart("camera_matrix")
+             ? std::optional(readCamera(*root.onlyPart("camera_matrix"), kOneCamera[1].second))
+             : std::nullopt;
 }
 
 Rig readDvCameras(const YamlEntry& root) {
@@ -293,10 +329,19 @@ Rig readDvCameras(const YamlEntry& root) {
 Rigid3 readEasyHandEye(const YamlEntry& root) {
   if (root.has("parameters")) {
     const YamlEntry parameters = root.section("parameters");
-    if (parameters.has("eye_on_hand") && parameters.text("eye_on_hand") != "true") {
-      throw parameters.failKey("eye_on_hand", inQuotes(parameters.text("eye_on_hand")),
-                               "true: a camera on the tracked body");
+    for (const auto& [key, on_body] :
+         {std::pair("eye_on_hand", "true"), std::pair("calibration_type", "eye_in_hand")}) {
+      if (!parameters.has(key) || parameters.text(key) == on_body) continue;
+      throw parameters.failKey(key, inQuotes(parameters.text(key)),
+                               std::string(on_body) + ": a camera on the tracked body");
     }
+  }
+  if (root.has("transform")) {
+    std::vector<double> v = numbersAt(root, "transform: translation: x y z", 3, "3, x y z");
+    for (const double q : numbersAt(root, "transform: rotation: x y z w", 4, "4, x y z w")) {
+      v.push_back(q);
+    }
+    return rigidFrom(root, v);
   }
   return rigidFrom(root, numbersAt(root, "transformation: x y z qx qy qz qw", 7, kSeven));
 }
@@ -330,9 +375,6 @@ Rigid3 readDsecHandEye(const YamlEntry& root, const Calibration* calibration) {
 
 namespace {
 
-constexpr Eigen::Index kTumVieCameras = 4;
-constexpr std::size_t kTumVieEventCameras[] = {2, 3};
-
 Rigid3 jsonPose(const YamlEntry& pose) {
   return rigidFrom(pose, numbersAt(pose, "px py pz qx qy qz qw", 7, kSeven));
 }
@@ -341,16 +383,18 @@ CameraModel kb4Camera(const YamlEntry& value, std::size_t index, const Eigen::Ma
   const auto row = static_cast<Eigen::Index>(index);
   CameraModel sized;
   setSensorSize(value, "resolution", sizes(row, 0), sizes(row, 1), sized);
-  return readCamera(value.item("intrinsics", index), kTumVie, {sized.width, sized.height});
+  return readCamera(value.item("intrinsics", index), kBasalt, {sized.width, sized.height});
 }
 
 }  // namespace
 
-Calibration readTumVieCalibration(const YamlEntry& root, const std::filesystem::path& file) {
+Calibration readBasaltCalibration(const YamlEntry& root, const std::filesystem::path& file) {
   const YamlEntry value = root.section("value0");
-  const Eigen::MatrixXd sizes = value.matrix("resolution", kTumVieCameras, 2);
+  const std::size_t count = value.sizeOf("resolution");
+  const Eigen::MatrixXd sizes = value.matrix("resolution", static_cast<int>(count), 2);
+  const bool tum_vie = count == 4 && sizes.row(0) != sizes.row(2);
   Calibration calibration{file, {}};
-  for (const std::size_t index : kTumVieEventCameras) {
+  for (std::size_t index = tum_vie ? 2 : 0; index < count; ++index) {
     RigCamera& camera = calibration.rig.cameras.emplace_back();
     camera.model = kb4Camera(value, index, sizes);
     const Rigid3 T_imu_cam = jsonPose(value.item("T_imu_cam", index));

@@ -18,19 +18,21 @@ namespace efm {
 ///   distortion_model   radtan | equidistant | none
 ///   distortion_coeffs  4 or 5 | 4 | 0 numbers (optional for none)
 ///   resolution         [width, height]
-///   T_cn_cnm1          4x4, for cameras after the first: from the camera before it to this one
+///   T_cn_cnm1          4x4, for cameras after the first: from the camera before it to this one;
+///                      or T_imu_cam (OpenVINS)
 ///   timeshift_cam_imu  seconds, optional: t_imu = t_cam + timeshift_cam_imu.
 /// The rig's frame and clock are those of camera 0: a camera's time offset is its timeshift minus
 /// the timeshift of camera 0. Other keys are ignored. Rotations may have errors of 1e-3, because of
 /// rounding; the nearest rotation is taken.
 Rig readCamchain(const std::filesystem::path& file);
 
-/// Reads T_imu_rig, the rig's pose on the IMU: the inverse of camera 0's T_cam_imu (4x4).
-/// @return std::nullopt if the camera chain does not have T_cam_imu.
+/// Reads T_imu_rig, the rig's pose on the IMU: the inverse of camera 0's T_cam_imu (4x4), or its
+/// T_imu_cam (OpenVINS). @return std::nullopt if the camera chain has neither.
 std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file);
 
 /// Reads the file of one camera, from the keys that its program writes: the table kOneCamera has
-/// Metavision, camera_calibration of ROS, OpenCV, messages of CameraInfo, VINS and camodocal.
+/// Metavision, camera_calibration of ROS, OpenCV, messages of CameraInfo, VINS, camodocal and
+/// nerfstudio; and the only camera of DV's XML, which has OpenCV's keys below the camera's name.
 /// Rectification and projection are ignored: events are not rectified.
 /// @return std::nullopt for the file of another program.
 std::optional<CameraModel> readOneCamera(const YamlEntry& root);
@@ -39,8 +41,8 @@ std::optional<CameraModel> readOneCamera(const YamlEntry& root);
 /// numbers, row by row: T_rig_cam).
 Rig readDvCameras(const YamlEntry& root);
 
-/// Reads the camera's pose on the robot's effector, from the result of easy_handeye:
-/// `transformation` with x y z qx qy qz qw.
+/// Reads the camera's pose on the robot's effector, from the result of easy_handeye
+/// (`transformation` with x y z qx qy qz qw) or easy_handeye2 (`transform`).
 Rigid3 readEasyHandEye(const YamlEntry& root);
 
 /// DSEC (Gehrig et al., RA-L 2021): two event cameras, cam0 left and cam3 right, and between them
@@ -57,13 +59,14 @@ Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::pa
 /// @param calibration calibration of the same rig; null: none is given.
 Rigid3 readDsecHandEye(const YamlEntry& root, const Calibration* calibration);
 
-/// TUM-VIE (Klenk et al., IROS 2021): JSON whose keys are below `value0`. Its cameras 2 and 3 (of
-/// four) are the event cameras. JSON is a part of YAML, and is read as YAML.
+/// Basalt and TUM-VIE (Klenk et al., IROS 2021): JSON whose keys are below `value0`. JSON is a part
+/// of YAML, and is read as YAML.
 
-/// Reads the rig of the event cameras from camera-calibration*.json: `intrinsics` (camera_type
-/// kb4, which is equidistant: fx … k4), `resolution`, `T_imu_cam` {px … qw}. T_imu_rig is T_imu_cam
-/// of camera 2.
-Calibration readTumVieCalibration(const YamlEntry& root, const std::filesystem::path& file);
+/// Reads a rig from Basalt's calibration.json or TUM-VIE's camera-calibration*.json: `intrinsics`
+/// (camera_type kb4, which is equidistant: fx … k4), `resolution`, `T_imu_cam` {px … qw}. If there
+/// are four cameras and the last two have another resolution, these are the event cameras of
+/// TUM-VIE, else all are. T_imu_rig is T_imu_cam of the first one.
+Calibration readBasaltCalibration(const YamlEntry& root, const std::filesystem::path& file);
 
 /// Reads the pose of the rig on the motion-capture marker from mocap-imu-calibration*.json:
 ///   T_marker_rig = T_imu_marker^-1 * T_imu_rig.

@@ -41,8 +41,23 @@ YAML::Node yamlOf(const cv::FileNode& part) {
   return node;
 }
 
+/// @throws std::runtime_error for elements within elements that would overflow the parser's stack.
+void requireFlatXml(const std::string& file) {
+  constexpr int kMaxDepth = 100;
+  std::ifstream stream(file);
+  int depth = 0;
+  for (char c = '\0', last = '\0'; stream.get(c); last = c) {
+    if (last == '<') depth += c == '/' ? -1 : c == '?' || c == '!' ? 0 : 1;
+    if (last == '/' && c == '>') --depth;
+    if (depth <= kMaxDepth) continue;
+    throw std::runtime_error(
+        fmt::format("{}: XML of over {} nested elements: expected a calibration", file, kMaxDepth));
+  }
+}
+
 /// Returns the document in an XML file of OpenCV's FileStorage.
 YAML::Node loadXml(const std::string& file) {
+  requireFlatXml(file);
   try {
     return yamlOf(
         cv::FileStorage(file, cv::FileStorage::READ | cv::FileStorage::FORMAT_XML).root());
@@ -66,7 +81,24 @@ std::string YamlEntry::text(const char* key) const {
 
 std::vector<double> YamlEntry::numbers(const char* key, std::size_t count,
                                        const char* expected) const {
-  return numbersIn(find(key), key, count, expected);
+  const YAML::Node list = find(key);
+  const bool is_matrix = list.IsMap() && list["data"];  // of OpenCV
+  if (!is_matrix && !list.IsSequence()) throw failNode(list, key, expected);
+  std::vector<double> values;
+  addNumbers(is_matrix ? list["data"] : list, key, values);
+  if (count == 0 || values.size() == count) return values;
+  throw fail(list, fmt::format("{}: {} numbers: expected {}", key, values.size(), expected));
+}
+
+void YamlEntry::addNumbers(const YAML::Node& node, const char* key,
+                           std::vector<double>& values) const {
+  if (node.IsSequence()) {
+    for (const YAML::Node& item : node) addNumbers(item, key, values);
+    return;
+  }
+  const auto number = finiteIn(node);
+  if (!number) throw failNode(node, key, "finite numbers");
+  values.push_back(*number);
 }
 
 double YamlEntry::number(const char* key) const {
@@ -76,26 +108,11 @@ double YamlEntry::number(const char* key) const {
 }
 
 Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const {
-  const std::string expected =
-      fmt::format("{}rows of {} numbers", rows == 0 ? "" : fmt::format("{} ", rows), columns);
-  const YAML::Node list = find(key);
-  if (list.IsSequence() && rows != 0 && list.size() > 0 && list[0].IsScalar()) {
-    const std::vector<double> values =
-        numbersIn(list, key, static_cast<std::size_t>(rows * columns), expected.c_str());
-    return Eigen::Map<const Eigen::Matrix<double, -1, -1, Eigen::RowMajor>>(values.data(), rows,
-                                                                            columns);
-  }
-  if (!list.IsSequence() || (rows != 0 && list.size() != static_cast<std::size_t>(rows))) {
-    throw failNode(list, key, expected);
-  }
-  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list.size()), columns);
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    const std::vector<double> values =
-        numbersIn(list[static_cast<std::size_t>(row)], key, static_cast<std::size_t>(columns),
-                  expected.c_str());
-    matrix.row(row) = Eigen::RowVectorXd::Map(values.data(), columns);
-  }
-  return matrix;
+  const std::string expected = fmt::format("{} rows of {} numbers", rows, columns);
+  const std::vector<double> values =
+      numbers(key, static_cast<std::size_t>(rows * columns), expected.c_str());
+  return Eigen::Map<const Eigen::Matrix<double, -1, -1, Eigen::RowMajor>>(values.data(), rows,
+                                                                          columns);
 }
 
 Eigen::Quaterniond YamlEntry::rotationIn(const Eigen::Matrix3d& matrix, const char* key) const {
@@ -135,23 +152,30 @@ YamlEntry YamlEntry::item(const char* key, std::size_t index) const {
   return {file_, nameOf(fmt::format("{}[{}]", key, index)), list[index]};
 }
 
+std::optional<YamlEntry> YamlEntry::onlyPart(const char* key) const {
+  std::vector<std::string> names;
+  for (const auto& part : node_) {
+    if (part.first.IsScalar() && part.second.IsMap() && part.second[key]) {
+      names.push_back(part.first.Scalar());
+    }
+  }
+  if (names.empty()) return std::nullopt;
+  if (names.size() > 1) {
+    throw fail(fmt::format("{} cameras, {}: expected one, or a camera chain as Kalibr writes it",
+                           names.size(), fmt::join(names, " and ")));
+  }
+  YAML::Node part = YAML::Clone(node_[names.front()]);
+  for (const auto& value : node_) {
+    if (!value.second.IsScalar() || !value.first.IsScalar()) continue;
+    if (!part[value.first.Scalar()]) part[value.first.Scalar()] = value.second;
+  }
+  return YamlEntry(file_, nameOf(names.front()), part);
+}
+
 YAML::Node YamlEntry::find(const char* key) const {
   const YAML::Node value = node_[key];
   if (!value) throw fail(fmt::format("{} is missing", key));
   return value;
-}
-
-std::vector<double> YamlEntry::numbersIn(const YAML::Node& list, const char* key, std::size_t count,
-                                         const char* expected) const {
-  if (!list.IsSequence()) throw failNode(list, key, expected);
-  std::vector<double> values;
-  for (const YAML::Node& item : list) {
-    const auto number = finiteIn(item);
-    if (!number) throw failNode(item, key, "finite numbers");
-    values.push_back(*number);
-  }
-  if (count == 0 || values.size() == count) return values;
-  throw fail(list, fmt::format("{}: {} numbers: expected {}", key, values.size(), expected));
 }
 
 std::runtime_error YamlEntry::failKey(const char* key, std::string_view found,

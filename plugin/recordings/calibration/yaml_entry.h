@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include <cstddef>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -23,13 +24,12 @@ class YamlEntry {
 
   bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   std::string text(const char* key) const;
-  /// Reads finite numbers.
+  /// Reads finite numbers: a list, lists in it one after another, or a matrix of OpenCV.
   /// @param count expected number of numbers; 0: any.
   /// @param expected the meaning of the numbers, for errors.
   std::vector<double> numbers(const char* key, std::size_t count, const char* expected) const;
   double number(const char* key) const;
-  /// Reads a list of rows, or, if their number is given, all numbers in one list, row by row.
-  /// @param rows expected number of rows; 0: any.
+  /// Reads a matrix, row by row, as `numbers`.
   Eigen::MatrixXd matrix(const char* key, int rows, int columns) const;
   /// Reads a 3x3 matrix. It may have errors of 1e-3 (rounding); the nearest rotation is taken.
   Eigen::Quaterniond rotation(const char* key) const;
@@ -40,6 +40,9 @@ class YamlEntry {
   YamlEntry section(const char* key) const;
   /// Returns the keys and values of an item of a list; `index` is from 0.
   YamlEntry item(const char* key, std::size_t index) const;
+  /// Returns the only part that has a key, with the values of the whole beside it; std::nullopt if
+  /// there is none.
+  std::optional<YamlEntry> onlyPart(const char* key) const;
   std::size_t sizeOf(const char* key) const { return find(key).size(); }
 
   std::runtime_error failKey(const char* key, std::string_view found,
@@ -50,8 +53,7 @@ class YamlEntry {
   YAML::Node find(const char* key) const;
   std::string nameOf(const std::string& part) const;
   Eigen::Quaterniond rotationIn(const Eigen::Matrix3d& matrix, const char* key) const;
-  std::vector<double> numbersIn(const YAML::Node& list, const char* key, std::size_t count,
-                                const char* expected) const;
+  void addNumbers(const YAML::Node& node, const char* key, std::vector<double>& values) const;
   std::runtime_error failNode(const YAML::Node& node, const char* key,
                               std::string_view expected) const;
   std::runtime_error fail(const YAML::Node& node, std::string_view what) const;

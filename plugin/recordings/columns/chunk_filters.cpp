@@ -14,6 +14,10 @@ namespace {
 
 constexpr ChunkFilter kDeflate = 1;
 constexpr ChunkFilter kShuffle = 2;
+constexpr ChunkFilter kLzo = 305;
+constexpr ChunkFilter kBzip2 = 307;
+constexpr ChunkFilter kLz4 = 32004;
+constexpr ChunkFilter kBitshuffle = 32008;
 constexpr ChunkFilter kLzf = 32000;
 constexpr ChunkFilter kBlosc = 32001;
 constexpr ChunkFilter kEcf = 0x8ECF;
@@ -85,10 +89,15 @@ std::string adviceForFilter(ChunkFilter filter) {
     return "Prophesee's ECF (0x8ECF), which no Debian package has: expected its plugin (hdf5_ecf) "
            "in HDF5_PLUGIN_PATH, or the RAW file in place of this one";
   }
+  if (filter == kLzo) {
+    return "LZO of PyTables (305), which no Debian package of HDF5 has: expected the file without "
+           "it "
+           "(package python3-tables: ptrepack --complib=zlib --complevel=1 FILE:/ NEW:/)";
+  }
+  const bool packed = filter == kBzip2 || filter == kLz4 || filter == kBitshuffle;
   return fmt::format(
-      "filter {}, which this system does not have: expected its plugin in HDF5_PLUGIN_PATH "
-      "(Debian: hdf5-filter-plugin)",
-      filter);
+      "filter {}, which this system does not have: expected its plugin in HDF5_PLUGIN_PATH{}",
+      filter, packed ? " (Debian: hdf5-filter-plugin)" : "");
 }
 
 std::optional<ChunkFilter> undoFilters(const std::vector<ChunkFilter>& filters,

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/files/file_content.h"
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/event_columns.h"
 
@@ -102,6 +102,20 @@ std::size_t indexOf(const std::string& name, const std::vector<std::string>& all
                   [](const FoundArray& array) { return hasPoses(array.header); })) {
     throw std::runtime_error(
         fmt::format("{}: {}: poses: expected --poses {}", file.string(), all, file.string()));
+  }
+  for (const FoundArray& pixels : arrays) {  // E-NeRF: position (N, 2)
+    if (!isMatrix(pixels.header) || pixels.header.shape[1] != 2) continue;
+    std::string others;
+    for (const FoundArray& array : arrays) {
+      const char column = eventColumnOf(headerWord(array.name()));
+      if (column == 't' || column == 'p')
+        others += fmt::format(", {}=z['{}']", column, array.name());
+    }
+    throw std::runtime_error(
+        fmt::format("{}: {}: expected x and y in arrays of their own: python3 -c \"import numpy as "
+                    "np; z = np.load('FILE'); np.savez('NEW.npz', x=z['{}'][:, 0], y=z['{}'][:, "
+                    "1]{})\"",
+                    file.string(), all, pixels.name(), pixels.name(), others));
   }
   const std::string given =
       options.columns.empty() ? "" : "; --event-columns '" + options.columns + "' names others";

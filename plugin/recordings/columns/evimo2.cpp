@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/columns/event_arrays.h"
+#include "plugin/recordings/text/pose_text.h"
 
 #include <fmt/format.h>
 
@@ -70,7 +71,7 @@ RecordingParts openEvimo2(const std::vector<fs::path>& folders, const ReaderOpti
   for (const fs::path& folder : folders) {
     parts.cameras.push_back(eventsOf(folder, options));
     if (parts.poses.empty() && isFile(folder / "poses.txt")) {
-      parts.poses = readPosesFile(folder / "poses.txt");
+      parts.poses = readPoseText(folder / "poses.txt", options, &parts.notes);
     }
   }
   const fs::path info = folders.front() / "dataset_info.npz";

@@ -11,7 +11,7 @@
 
 #include "maps/io/npy_header.h"
 #include "plugin/recordings/columns/event_table.h"
-#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/files/file_content.h"
 
 namespace efm {
 

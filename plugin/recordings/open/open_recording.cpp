@@ -150,8 +150,10 @@ bool isPoses(const Path& path) {
     throw std::runtime_error(name + ": a calibration: expected --calibration " + name);
   }
   const std::string why = whyNoRawlog(path).value_or("it looks like a rawlog");
-  if (const auto line = whyNoEventLines(beginningOfText(path))) {
-    throw std::runtime_error(name + ":" + *line);
+  if (hasEventTable(beginningOfText(path))) {
+    std::vector<Event> events;
+    EventTextStream(path).read(events);  // throws the error of its first line
+    throw std::runtime_error(name + ": there is no event after the header");
   }
   throw std::runtime_error(
       fmt::format("{}: not a recording ({}): expected a rawlog, or a recording in another format "
@@ -461,12 +463,7 @@ RigSetup readRigSetup(const RecordingSource& source) {
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
-  for (const auto& [name, unit] : {std::pair("time_unit", source.reader.time_unit),
-                                   std::pair("pose_time_unit", source.reader.pose_time_unit)}) {
-    if (unit.empty() || timeExponentOf(unit)) continue;
-    throw std::invalid_argument(
-        fmt::format("{} = '{}': expected one of s, ms, us, ns", name, unit));
-  }
+  requireUnits(source.reader);
   requireGivenFile(source.poses, "--poses", {});
   RigSetup setup = readRigSetup(source);
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
@@ -513,12 +510,12 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   return join(std::move(joined), source.limits);
 }
 
-std::vector<TruthDepth> openTruth(const RecordingSource& source) {
-  std::vector<TruthDepth> truth;
+std::vector<TimedFile> openTruth(const RecordingSource& source) {
+  std::vector<TimedFile> truth;
   for (const Path& file : source.files) {
     const RecordingFormat* const format = formatOf(file, source);
     if (format == nullptr || format->truth == nullptr) continue;
-    const std::vector<TruthDepth> found = format->truth(file);
+    const std::vector<TimedFile> found = format->truth(file);
     truth.insert(truth.end(), found.begin(), found.end());
   }
   return truth;

@@ -67,6 +67,6 @@ RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
 
 /// Returns the depth maps of the recording's truth, for formats with `RecordingFormat::truth`.
 /// Opens no events.
-std::vector<TruthDepth> openTruth(const RecordingSource& source);
+std::vector<TimedFile> openTruth(const RecordingSource& source);
 
 }  // namespace efm

@@ -2,147 +2,136 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/columns/npy_array.h"
+#include "plugin/recordings/files/file_content.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/streams/file_content.h"
 #include "plugin/recordings/streams/time_unit.h"
+#include "plugin/recordings/text/text_table.h"
 
 namespace efm {
 namespace {
 
-Rigid3 poseFromVector(const std::array<double, 7>& v) {
-  const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
-  if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
-  throw std::runtime_error(fmt::format(
-      "qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %; are the columns "
-      "in this order?",
-      numbers.coeffs().stableNorm()));
-}
+/// The arrays of a recording's poses; `times` is null if each row of `poses` begins with a time.
+/// `rotations` are quaternions if `poses` are positions alone.
+struct PoseArrays {
+  std::shared_ptr<NpyArray> times;
+  std::shared_ptr<NpyArray> poses;
+  std::shared_ptr<NpyArray> rotations = nullptr;
+};
 
-Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
-  if (const auto T_world_body = transformNear(numbers)) return *T_world_body;
-  throw std::runtime_error(
-      "a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001");
-}
-
-/// @param first index of the pose's first column.
-Rigid3 poseOf(const std::shared_ptr<NpyArray>& array, std::uint64_t row, std::size_t first) {
-  const auto number = [&](std::size_t k) { return NpyArray::columnOf(array, k).number(row); };
-  if (array->columns() == 16) {
-    Eigen::Matrix4d matrix;
-    for (int k = 0; k < 16; ++k) matrix(k / 4, k % 4) = number(static_cast<std::size_t>(k));
-    if (matrix.allFinite()) return poseFromMatrix(matrix);
-  } else {
-    std::array<double, 7> values{};
-    bool finite = true;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      values[k] = number(first + k);
-      finite = finite && std::isfinite(values[k]);
+Rigid3 poseOf(const PoseArrays& arrays, std::uint64_t row) {
+  std::vector<double> numbers;
+  for (const auto& array : {arrays.poses, arrays.rotations}) {
+    for (std::size_t k = arrays.times ? 0 : 1; array && k < array->columns(); ++k) {
+      numbers.push_back(NpyArray::columnOf(array, k).number(row));
     }
-    if (finite) return poseFromVector(values);
   }
-  throw std::runtime_error("a number is not finite: expected finite ones");
+  if (arrays.rotations && arrays.rotations->name().find("wxyz") != std::string::npos) {
+    std::rotate(numbers.begin() + 3, numbers.begin() + 4, numbers.end());
+  }
+  return transformOf(numbers);
 }
 
 std::string shapeOf(const NpyArray& array) {
   return fmt::format("({})", fmt::join(array.header().shape, ", "));
 }
 
-/// The arrays of a recording's poses; `times` is null if each row of `poses` begins with a time.
-struct PoseArrays {
-  std::shared_ptr<NpyArray> times;
-  std::shared_ptr<NpyArray> poses;
-};
+/// What an array may be, by its shape.
+enum class Kind { kTimes, kTimedPoses, kPoses, kPositions, kQuaternions, kOther };
 
-bool hasPoseShape(const NpyArray& array, bool with_time) {
+Kind kindOf(const NpyArray& array) {
   const std::vector<std::uint64_t>& shape = array.header().shape;
-  if (shape.size() == 3) return !with_time && shape[1] == 4 && shape[2] == 4;
-  return shape.size() == 2 && shape[1] == (with_time ? 8U : 7U);
+  if (shape.size() == 3) return shape[1] == 4 && shape[2] == 4 ? Kind::kPoses : Kind::kOther;
+  if (shape.size() == 1) return Kind::kTimes;
+  constexpr std::pair<std::uint64_t, Kind> kColumns[] = {{1, Kind::kTimes},
+                                                         {3, Kind::kPositions},
+                                                         {4, Kind::kQuaternions},
+                                                         {7, Kind::kPoses},
+                                                         {8, Kind::kTimedPoses}};
+  for (const auto& [columns, kind] : kColumns) {
+    if (shape.size() == 2 && shape[1] == columns) return kind;
+  }
+  return Kind::kOther;
 }
 
-bool hasTimeShape(const NpyArray& array) {
-  const std::vector<std::uint64_t>& shape = array.header().shape;
-  return shape.size() == 1 || (shape.size() == 2 && shape[1] == 1);
+std::string stemOf(const std::string& member) {
+  return std::filesystem::path(member).stem().string();
 }
 
-bool namesTimes(const std::string& member) {
-  return headerWord(std::filesystem::path(member).stem().string()).isTime();
-}
+bool namesTimes(const std::string& member) { return headerWord(stemOf(member)).isTime(); }
 
 bool namesPoses(const std::string& member) {
-  const std::string name = std::filesystem::path(member).stem().string();
+  const std::string name = stemOf(member);
   return name == "poses" || name == "pose" || name == "T_world_body" || name == "trajectory";
-}
-
-/// Opens the member that fits: the only candidate, or the only candidate with a fitting name.
-std::shared_ptr<NpyArray> chooseArray(const std::filesystem::path& file,
-                                      std::vector<std::string> candidates, const char* what,
-                                      bool (*has_name)(const std::string&),
-                                      const std::string& all) {
-  if (candidates.size() != 1) {
-    candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                    [&](const std::string& name) { return !has_name(name); }),
-                     candidates.end());
-  }
-  if (candidates.size() == 1) return std::make_shared<NpyArray>(file, candidates.front());
-  throw std::runtime_error(fmt::format(
-      "{}: has {}: expected an array of N times, and one of N poses, N x 7 (tx ty tz qx "
-      "qy qz qw) or N x 4 x 4; {} is not clear",
-      file.string(), all, what));
 }
 
 PoseArrays openPoseArrays(const std::filesystem::path& file) {
   if (!isCompressed(file)) {
     auto poses = std::make_shared<NpyArray>(file);
-    if (hasPoseShape(*poses, true)) return {nullptr, std::move(poses)};
+    if (kindOf(*poses) == Kind::kTimedPoses) return {nullptr, std::move(poses)};
     throw std::runtime_error(
         fmt::format("{}: shape {}: expected N rows of 8 numbers, t tx ty tz qx qy qz qw, or a .npz "
                     "file with times and poses",
                     file.string(), shapeOf(*poses)));
   }
-  std::vector<std::string> with_time;
-  std::vector<std::string> poses;
-  std::vector<std::string> times;
+  std::map<Kind, std::vector<std::string>> members;
   std::string all;
   for (const std::string& member : membersOf(file)) {
     std::string shape;
     try {
       const NpyArray array(file, member);
       shape = shapeOf(array);
-      if (hasPoseShape(array, true)) with_time.push_back(member);
-      if (hasPoseShape(array, false)) poses.push_back(member);
-      if (hasTimeShape(array)) times.push_back(member);
+      members[kindOf(array)].push_back(member);
     } catch (const std::runtime_error&) {
       shape = "(no numbers)";  // EVIMO2's meta: Python objects
     }
     all += (all.empty() ? "" : ", ") + member + " " + shape;
   }
-  if (with_time.size() == 1) {
-    return {nullptr, std::make_shared<NpyArray>(file, with_time.front())};
+  // Opens the member of a kind: the only one, or the only one with a fitting name.
+  const auto open = [&](Kind kind, const char* what, bool (*has_name)(const std::string&)) {
+    std::vector<std::string> found = members[kind];
+    const auto unfit = [&](const std::string& name) { return !has_name || !has_name(name); };
+    if (found.size() != 1)
+      found.erase(std::remove_if(found.begin(), found.end(), unfit), found.end());
+    if (found.size() == 1) return std::make_shared<NpyArray>(file, found.front());
+    throw std::runtime_error(fmt::format(
+        "{}: has {}: expected an array of N times, and one of N poses, N x 7 (tx ty tz qx qy qz "
+        "qw) "
+        "or N x 4 x 4, or N x 3 positions and N x 4 quaternions (x y z w); {} is not clear",
+        file.string(), all, what));
+  };
+  if (members[Kind::kTimedPoses].size() == 1) {
+    return {nullptr, open(Kind::kTimedPoses, "", nullptr)};
   }
-  return {chooseArray(file, times, "the times", namesTimes, all),
-          chooseArray(file, poses, "the poses", namesPoses, all)};
+  auto times = open(Kind::kTimes, "the times", namesTimes);
+  if (members[Kind::kPoses].empty() && !members[Kind::kPositions].empty()) {
+    return {std::move(times), open(Kind::kPositions, "the positions", nullptr),
+            open(Kind::kQuaternions, "the quaternions", nullptr)};
+  }
+  return {std::move(times), open(Kind::kPoses, "the poses", namesPoses)};
 }
 
 /// Returns the exponent of the unit of times: from the array's name, else from the first times.
 int timeExponentOf(const RowColumn& times, const std::string& name, const ReaderOptions& options) {
   constexpr std::uint64_t kSample = 4096;
-  const auto exponent = headerWord(std::filesystem::path(name).stem().string()).time_exponent;
+  const auto exponent = headerWord(stemOf(name)).time_exponent;
   if (exponent) return *exponent;  // for example t_us.npy
   TimeSample sample;
   for (std::uint64_t row = 0; row < std::min(times.rows->size(), kSample); ++row) {
     const double t = times.number(row);
     sample.add(t, !isReal(times.type) || std::floor(t) == t);
   }
-  if (options.pose_time_unit.empty()) requireTimesOfPoses(sample, name);
+  if (options.pose_time_unit.empty()) requireTimesOfPoses(sample, name, options);
   return sample.whole ? poseTimeExponent(options, sample, name) : 0;
 }
 
@@ -153,9 +142,10 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
   const PoseArrays arrays = openPoseArrays(file);
   NpyArray& poses = *arrays.poses;
   const std::shared_ptr<NpyArray> times_array = arrays.times ? arrays.times : arrays.poses;
-  if (times_array->size() != poses.size()) {
-    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", times_array->name(),
-                                         times_array->size(), poses.size(), poses.name()));
+  for (const auto& array : {times_array, arrays.rotations}) {
+    if (!array || array->size() == poses.size()) continue;
+    throw std::runtime_error(fmt::format("{}: {} rows: expected {}, as {} has", array->name(),
+                                         array->size(), poses.size(), poses.name()));
   }
   std::vector<StampedPose> result;
   if (poses.size() == 0) return result;
@@ -168,7 +158,7 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
           row, fmt::format("t = {}: expected {}", times.number(row), kExpectedTime));
     }
     try {
-      result.push_back({*t_ns, poseOf(arrays.poses, row, arrays.times ? 0 : 1)});
+      result.push_back({*t_ns, poseOf(arrays, row)});
     } catch (const std::runtime_error& error) {
       throw poses.failAt(row, error.what());
     }

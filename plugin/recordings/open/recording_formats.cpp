@@ -14,10 +14,11 @@
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/columns/event_arrays.h"
 #include "plugin/recordings/columns/hdf5_files.h"
+#include "plugin/recordings/files/file_content.h"
 #include "plugin/recordings/sensors/aedat4.h"
 #include "plugin/recordings/sensors/prophesee_raw.h"
-#include "plugin/recordings/streams/file_content.h"
 #include "plugin/recordings/streams/pose_conflict.h"
+#include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
@@ -52,8 +53,6 @@ constexpr const char* kConvert = "convert it to AEDAT4, or to text, a line t x y
 
 constexpr UnreadFormat kUnreadFormats[] = {
     {"version https://git-lfs"sv, "a pointer of git-LFS, not the file itself", "run git lfs pull"},
-    {"% Data file"sv, "a DAT file of Prophesee",
-     "give the RAW file, or convert it to HDF5 with Metavision's tools"},
     {"% "sv, "a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header",
      "the encoding of its events is not known; give the RAW file as it was recorded"},
     {"Event Stream"sv, "an Event Stream file (.es)",
@@ -175,8 +174,18 @@ std::optional<std::string> unreadFile(const fs::path& file) {
 std::optional<std::string> unreadFolder(const fs::path& folder) {
   constexpr std::size_t kMost = 100;  // some files of a folder of pictures are enough
   std::vector<fs::path> files;
+  std::vector<std::string> recordings;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (isFile(entry.path()) && files.size() < kMost) files.push_back(entry.path());
+    if (recordings.size() == kMost || !fs::is_directory(entry.path())) continue;
+    if (detectFormat(entry.path()) != nullptr) recordings.push_back(entry.path().filename());
+  }
+  std::sort(recordings.begin(), recordings.end());
+  if (!recordings.empty()) {
+    return fmt::format(
+        "a folder with {} recordings, {}: give one of them; docs/many-recordings.md "
+        "maps all",
+        recordings.size(), fmt::join(recordings, ", "));
   }
   if (fs::is_empty(folder)) return "an empty folder: expected a recording";
   std::sort(files.begin(), files.end());
@@ -258,7 +267,11 @@ RecordingParts readAnyPoses(const fs::path& file, const ReaderOptions& options) 
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
   rejectUnread(file);
-  parts.poses = readPoseText(file, options);
+  if (trimmed(start).substr(0, 1) == "{") {
+    parts.poses = readPoseFrames(file, options);
+  } else {
+    parts.poses = readPoseText(file, options, &parts.notes);
+  }
   return parts;
 }
 
@@ -302,8 +315,8 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"rosbag", "a ROS 1 bag (.bag)", looksLikeRosbag, openBags},
       {"rosbag2", "a ROS 2 bag (.mcap, .db3 or the folder with metadata.yaml)", looksLikeRosbag2,
        openBags},
-      {"raw", "a RAW file of a Prophesee camera (EVT 2.0, 2.1 or 3.0)", looksLikePropheseeRaw,
-       openPropheseeRaw},
+      {"raw", "a RAW or DAT file of a Prophesee camera (EVT 2.0, 2.1 or 3.0)",
+       looksLikePropheseeRaw, openPropheseeRaw},
       {"aedat4", "an AEDAT4 file", looksLikeAedat4, openAedat4},
       {"evimo2", "a folder of EVIMO2 (dataset_events_t.npy and others)", looksLikeEvimo2,
        openEvimo2},
@@ -343,6 +356,15 @@ void requireRawlog(const std::filesystem::path& file) {
       "): expected a rawlog, or a recording in another format (docs/recordings.md)");
 }
 
+void requireUnits(const ReaderOptions& options) {
+  for (const auto& [name, unit] : {std::pair("time_unit", options.time_unit),
+                                   std::pair("pose_time_unit", options.pose_time_unit)}) {
+    if (unit.empty() || timeExponentOf(unit)) continue;
+    throw std::invalid_argument(
+        fmt::format("{} = '{}': expected one of s, ms, us, ns", name, unit));
+  }
+}
+
 const RecordingFormat* detectFormat(const std::filesystem::path& source) {
   for (const RecordingFormat& format : readerFormats()) {
     if (format.matches(source)) return &format;
@@ -351,8 +373,10 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source) {
 }
 
 RecordingParts readPoseParts(const fs::path& file, const ReaderOptions& options) {
+  requireUnits(options);
   RecordingParts parts = readAnyPoses(file, options);
-  parts.poses = requirePoses(std::move(parts.poses), file);
+  if (parts.poses.empty())
+    throw std::runtime_error(file.string() + ": no poses: expected one or more");
   return parts;
 }
 

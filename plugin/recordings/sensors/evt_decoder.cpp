@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <type_traits>
 
 namespace efm {
 namespace evt {
@@ -61,13 +62,16 @@ inline Event* putVector(Event* at, std::uint32_t bits, std::uint64_t t_ns, unsig
 
 /// Returns whether the events' time and row are known.
 inline bool isComplete(const Evt2State& state) { return state.has_high; }
+inline bool isComplete(const DatState& /*state*/) { return true; }
 inline bool isComplete(const Evt3State& state) {
   return state.has_high && state.has_low && state.has_y;
 }
 
-/// @param value value of a TIME_HIGH, 28 bits.
-inline void setHigh(Evt2State& state, std::uint32_t value) {
-  constexpr std::uint64_t kRange = std::uint64_t{1} << 28U;
+/// @param value value of a TIME_HIGH, 28 bits, or of the time of DAT, 32 bits.
+template <typename State>
+void setHigh(State& state, std::uint32_t value) {
+  constexpr unsigned kBits = std::is_same_v<State, DatState> ? 32 : 28;
+  constexpr std::uint64_t kRange = std::uint64_t{1} << kBits;
   const std::uint64_t step = (value - state.high) % kRange;
   const std::uint64_t back = step >= kRange / 2 ? kRange : 0;
   state.high = state.begun ? state.high + step - back : value;
@@ -200,6 +204,21 @@ struct Evt3Code {
   }
 };
 
+struct DatCode {
+  using State = DatState;
+  using Word = std::uint64_t;
+  static constexpr std::size_t kMaxEvents = 1;
+
+  static Word load(Word word) { return word; }
+  static std::uint32_t highOf(Word word) { return static_cast<std::uint32_t>(word); }
+  static Word highWord(const State& state) { return state.high; }
+  static Event* step(State& state, Word word, Event* at) {
+    setHigh(state, highOf(word));
+    return putEvent(at, kNsPerUs * state.high, bitsOf(word, 32, 14), bitsOf(word, 46, 14),
+                    bitsOf(word, 60, 1) != 0);
+  }
+};
+
 /// Space for the events of many words, and for the events that a vector writes after its last one.
 constexpr std::size_t kScratchEvents = 4096;
 constexpr std::size_t kScanWords = 64;
@@ -216,6 +235,8 @@ void withCode(EvtEncoding encoding, const Call& call) {
       return call(Evt21Code<true>());
     case EvtEncoding::kEvt3:
       return call(Evt3Code());
+    case EvtEncoding::kDat:
+      return call(DatCode());
   }
 }
 
@@ -343,7 +364,8 @@ std::int64_t EvtDecoder::timeHighNs() const {
   if (const auto* const state = std::get_if<Evt3State>(&state_)) {
     return static_cast<std::int64_t>(evt::kNsPerUs * 4096 * state->high);
   }
-  return static_cast<std::int64_t>(evt::kNsPerUs * 64 * std::get<Evt2State>(state_).high);
+  const auto* const state = std::get_if<Evt2State>(&state_);
+  return static_cast<std::int64_t>(evt::kNsPerUs * 64 * (state != nullptr ? state->high : 0));
 }
 
 bool EvtDecoder::hasTime() const {

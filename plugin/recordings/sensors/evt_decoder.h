@@ -13,8 +13,9 @@ namespace efm {
 
 /// Prophesee's encodings of events in little-endian words. EVT 2.0: words of 32 bits, one event
 /// each. EVT 2.1: words of 64 bits, up to 32 events of a row each; the legacy order (IMX636) stores
-/// the upper 32 bits first. EVT 3.0: words of 16 bits, each changes time, row or column.
-enum class EvtEncoding { kEvt2, kEvt21, kEvt21Legacy, kEvt3 };
+/// the upper 32 bits first. EVT 3.0: words of 16 bits, each changes time, row or column. DAT: words
+/// of 64 bits, one event each with its whole time.
+enum class EvtEncoding { kEvt2, kEvt21, kEvt21Legacy, kEvt3, kDat };
 
 /// The state of EVT 2.0 and 2.1 between two words.
 struct Evt2State {
@@ -38,6 +39,13 @@ struct Evt3State {
   bool has_y = false;
 };
 
+/// The state of DAT between two words.
+struct DatState {
+  std::uint64_t high = 0;  ///< Time of the last event without wraps, µs.
+  bool begun = false;      ///< True after the first event.
+  bool has_high = true;
+};
+
 /// Decodes a stream of EVT words. The stream may be divided anywhere, also within a word.
 ///
 /// Times are those of the sensor's clock, which has its own zero, in ns and without wraps. The
@@ -52,6 +60,8 @@ struct Evt3State {
 ///   changed since the last TIME_LOW, then TIME_HIGH is late: the time goes on in the next 4096 µs.
 ///   The late TIME_HIGH then has the value that is already set, and does not step again.
 ///
+/// - DAT: 32 bits (µs, wraps after 71 minutes) with each event, unwrapped as those of EVT 2.0.
+///
 /// Words of other types (triggers, vendor data) are skipped. Until time and row are known, events
 /// are not delivered, but counted.
 class EvtDecoder {
@@ -61,7 +71,8 @@ class EvtDecoder {
   /// Appends the events of the next bytes of the stream to `events`, in the order of the stream.
   void decode(const std::uint8_t* data, std::size_t size, std::vector<Event>& events);
   /// Skips the next bytes and follows only the TIME_HIGH words, which is several times faster. A
-  /// later `decode` does not deliver, but counts, the events before the next TIME_LOW and row.
+  /// later `decode` does not deliver, but counts, the events before the next TIME_LOW and row. Not
+  /// for DAT.
   void scanTime(const std::uint8_t* data, std::size_t size);
   /// Reports that bytes are missing before the next call. The gap must be shorter than a wrap.
   void skipGap();
@@ -86,7 +97,7 @@ class EvtDecoder {
   void carry(const std::uint8_t* data, std::size_t size);
 
   EvtEncoding encoding_;
-  std::variant<Evt2State, Evt3State> state_;
+  std::variant<Evt2State, Evt3State, DatState> state_;
   std::array<std::uint8_t, 8> carry_{};  // the beginning of an incomplete word
   std::size_t carried_ = 0;
   std::uint64_t undated_events_ = 0;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdint>
 #include <fstream>
 #include <memory>
@@ -22,7 +23,8 @@ namespace {
 
 /// The values in the lines "% key value" at the beginning of a RAW file.
 struct RawHeader {
-  EvtEncoding encoding = EvtEncoding::kEvt3;  ///< "% evt 3.0" or "% format EVT3;…"
+  /// "% evt 3.0" or "% format EVT3;…"; "% Data file …" of DAT.
+  EvtEncoding encoding = EvtEncoding::kEvt3;
   /// Size in "% geometry 1280x720" or "% format …;height=720;…"; else the size of the camera that
   /// "% plugin_name" or "% system_ID" names, as in files of 2020.
   std::optional<CameraSize> size;
@@ -76,13 +78,18 @@ class RawHeaderParser {
       if (key == "format") takeFormat(value);
       if (key == "geometry") takeGeometry(value);
       if (key == "endianness") takeOrder(value);
+      if (key == "Data") encoding_ = EvtEncoding::kDat;
+      if (key == "Width" || key == "Height") takeSide(key, value);
+      if (key == "Version" && value != "2") throw fail(key, value, "2, of a DAT file");
       if (!camera_size_) camera_size_ = sizeOfCamera(key, value);
     }
+    if (!header_.size && size_.width > 0 && size_.height > 0) header_.size = size_;
     if (!header_.size) header_.size = camera_size_;
+    if (encoding_ == EvtEncoding::kDat) takeDatType();
     if (!encoding_) {
       throw std::runtime_error(
           fmt::format("{}: no encoding: expected a RAW file with a line '% evt 3.0', 2.0 or 2.1 in "
-                      "its header",
+                      "its header, or a DAT file",
                       file_.string()));
     }
     header_.encoding =
@@ -108,20 +115,31 @@ class RawHeaderParser {
   void takeFormat(std::string_view value) {
     const std::vector<std::string_view> parts = splitWords(value, ";");
     takeEncoding("format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
-    CameraSize size;
     for (const std::string_view part : parts) {
       const std::size_t equal = part.find('=');
       if (equal == std::string_view::npos) continue;
       const std::string_view key = part.substr(0, equal);
       const std::string_view number = part.substr(equal + 1);
       if (key == "endianness") takeOrder(number);
-      if (key == "width" || key == "height") {
-        const int side = parseNumber<std::uint16_t>(number).value_or(0);
-        if (side == 0) throw fail(key, number, "a number of pixels from 1 to 65535");
-        (key == "width" ? size.width : size.height) = side;
-      }
+      if (key == "width" || key == "height") takeSide(key, number);
     }
-    if (size.width > 0 && size.height > 0) header_.size = size;
+    if (size_.width > 0 && size_.height > 0) header_.size = size_;
+  }
+
+  void takeSide(std::string_view key, std::string_view number) {
+    const int side = parseNumber<std::uint16_t>(number).value_or(0);
+    if (side == 0) throw fail(key, number, "a number of pixels from 1 to 65535");
+    (std::tolower(key.front()) == 'w' ? size_.width : size_.height) = side;
+  }
+
+  /// Takes the two bytes after the header of DAT: the type of the events (CD) and their size.
+  void takeDatType() {
+    const std::string_view type = text_.substr(header_.bytes, 2);
+    header_.bytes += 2;
+    if (type == "\x0c\x08" || type == std::string_view("\0\x08", 2)) return;
+    throw std::runtime_error(
+        fmt::format("{}: the bytes {} after the header: expected CD events (12 or 0) of 8 bytes",
+                    file_.string(), inQuotes(type)));
   }
 
   void takeGeometry(std::string_view value) {
@@ -165,6 +183,7 @@ class RawHeaderParser {
   int number_ = 0;
   std::optional<EvtEncoding> encoding_;
   bool legacy_order_ = false;
+  CameraSize size_;                        // sides that the header names one by one
   std::optional<CameraSize> camera_size_;  // size of a camera that the header names
 };
 
@@ -214,6 +233,7 @@ class PropheseeRawStream : public EventStream {
   /// Reads only the TIME_HIGH words up to the time (some GB/s): in EVT 3.0, nothing else shows how
   /// often the clock wrapped.
   void seek(std::int64_t t_ns) override {
+    if (header_.encoding == EvtEncoding::kDat) return;  // few enough bytes to read them all
     // `scan` reaches the time in the current block. Decoding starts one block earlier, to find the
     // other values of its events, for instance the row.
     EvtDecoder scan(header_.encoding);
@@ -289,8 +309,9 @@ bool looksLikePropheseeRaw(const std::filesystem::path& file) {
   const std::string text = firstBytesOf(file, kMaxRawHeaderBytes);
   const std::size_t lines_end = text.rfind('\n');
   const std::string_view lines = std::string_view(text).substr(0, lines_end);
-  return lines.substr(0, 2) == "% " && (lines.find("% evt ") != std::string_view::npos ||
-                                        lines.find("% format EVT") != std::string_view::npos);
+  return lines.substr(0, 2) == "% " &&
+         (lines.find("% evt ") != std::string_view::npos || lines.find("% Data file") == 0 ||
+          lines.find("% format EVT") != std::string_view::npos);
 }
 
 RecordingParts openPropheseeRaw(const std::vector<std::filesystem::path>& files,

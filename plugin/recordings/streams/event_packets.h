@@ -24,10 +24,10 @@ inline constexpr std::size_t kMaxPacketEvents = std::size_t{1} << 20;
 /// into packets on a grid of time. It reads on demand: memory holds one block, one packet and the
 /// events of 10 ms. More than 4 events per pixel at one time are an error. An event is wrong if it
 /// is over 1 s ahead of both its neighbours, or over 10 s ahead at the end. If more than 1 % of the
-/// events, at least ten, are over 10 ms late, they are not in order at all: an error, also if wrong events may be
-/// left out. A wrong event is a
-/// std::runtime_error that names the position, the value and the expected value. The error is
-/// thrown after the packets of the earlier events, and again by every further call.
+/// events, at least ten, are over 10 ms late, they are not in order at all: an error, also if wrong
+/// events may be left out. A wrong event is a std::runtime_error that names the position, the value
+/// and the expected value. The error is thrown after the packets of the earlier events, and again
+/// by every further call.
 class EventPackets {
  public:
   /// @param size size of the sensor: events outside it are wrong.

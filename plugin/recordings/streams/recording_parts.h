@@ -93,9 +93,11 @@ class EventStream {
   virtual std::vector<Warning> warnings() const { return {}; }
 };
 
-struct TruthDepth {
+/// A picture of a list. The truth's: float32 TIFF, z-depth in metres in camera 0's undistorted
+/// view.
+struct TimedFile {
   std::int64_t t_ns = 0;
-  std::filesystem::path file;  ///< float32 TIFF: z-depth in metres in camera 0's undistorted view.
+  std::filesystem::path file;
 };
 
 /// The objects of a rawlog other than events and poses.
@@ -117,7 +119,7 @@ struct RecordingParts {
 
   std::vector<StampedPose> poses;        ///< T_world_body, in any order.
   std::vector<PoseSample> pose_samples;  ///< Poses of a rawlog, in place of `poses`.
-  std::unique_ptr<OtherStream> others;  ///< Other objects of a rawlog; null: none.
+  std::unique_ptr<OtherStream> others;   ///< Other objects of a rawlog; null: none.
   /// The error of damage after the last of `poses`; empty if there is no damage.
   std::string poses_damage;
 
@@ -154,6 +156,8 @@ struct ReaderOptions {
   std::string time_unit;
   /// The unit of times in text poses whose header names none. Empty: `time_unit` for whole numbers.
   std::string pose_time_unit{};
+  /// The option that gives `pose_time_unit`, for errors.
+  std::string pose_unit_option = "--pose-time-unit";
   /// The size of all sensors, used if neither the recording nor a calibration has it.
   std::optional<CameraSize> sensor_size{};
   bool keep_originals = false;  ///< True if poses of a rawlog keep their originals: see PoseSample.
@@ -179,7 +183,7 @@ struct RecordingFormat {
   /// Opens the files of one recording, at least one file. Cameras are in the order of the files.
   RecordingParts (*open)(const std::vector<std::filesystem::path>& files, const ReaderOptions&);
   /// Returns the depth maps of a source's truth, in the order of its list; null: there are none.
-  std::vector<TruthDepth> (*truth)(const std::filesystem::path& source) = nullptr;
+  std::vector<TimedFile> (*truth)(const std::filesystem::path& source) = nullptr;
 };
 
 /// Returns whether a path is a regular file or a link to a regular file. Never throws.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <stdexcept>
 
 namespace efm {
@@ -70,7 +69,7 @@ std::optional<int> timeExponentOf(std::string_view unit) {
   } kUnits[] = {{0, " s sec secs second seconds "},
                 {-3, " ms msec msecs millisecond milliseconds "},
                 {-6, " us µs μs usec usecs microsecond microseconds "},
-                {-9, " ns nsec nsecs nanosecond nanoseconds "}};
+                {-9, " ns nsec nsecs nanosec nanosecs nanosecond nanoseconds "}};
   if (unit.empty() || unit.find(' ') != std::string_view::npos) return std::nullopt;
   for (const auto& [exponent, names] : kUnits) {
     if (names.find(fmt::format(" {} ", unit)) != std::string_view::npos) return exponent;
@@ -144,7 +143,8 @@ TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
                                        where, guessOf(sample, usual)));
 }
 
-void requireSecondsOfPoses(const TimeSample& sample, const std::string& where) {
+void requireSecondsOfPoses(const TimeSample& sample, const std::string& where,
+                           const ReaderOptions& options) {
   constexpr int kEnough = 10;
   constexpr double kFarTooRare = 0.01;  // poses per second
   if (sample.count < kEnough || sample.latest <= sample.earliest ||
@@ -153,11 +153,11 @@ void requireSecondsOfPoses(const TimeSample& sample, const std::string& where) {
   }
   throw std::runtime_error(fmt::format("{}: {} poses take {:.3g} of a unit that is not seconds: {}",
                                        where, sample.count, sample.latest - sample.earliest,
-                                       guessOf(sample, kUsualPoseRate)));
+                                       guessOf(sample, usualPoseRate(options))));
 }
 
 void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
-                         const std::string& renumber) {
+                         const ReaderOptions& options, const std::string& renumber) {
   constexpr int kEnough = 3;
   constexpr double kMostFrames = 1e6;
   if (sample.count < kEnough) return;
@@ -177,65 +177,17 @@ void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
   throw std::runtime_error(fmt::format(
       "{}: the times are whole numbers from {} on, {}: numbers of frames? Expected times{}; if "
       "they "
-      "are times, --pose-time-unit s, ms, us or ns",
+      "are times, {} s, ms, us or ns",
       where, sample.earliest, consecutive ? "each one more than the last" : "at least 1 apart",
-      renumber.empty() ? "" : " (" + renumber + ")"));
+      renumber.empty() ? "" : " (" + renumber + ")", options.pose_unit_option));
 }
 
 int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
                      const std::string& where) {
   if (!options.pose_time_unit.empty()) return timeExponentOf(options.pose_time_unit).value_or(0);
-  const TimeUnit unit = findTimeUnit(options, sample, kUsualPoseRate, where);
+  const TimeUnit unit = findTimeUnit(options, sample, usualPoseRate(options), where);
   if (unit.warning) throw std::runtime_error(unit.warning->text);
   return unit.exponent;
-}
-
-bool HeaderWord::isTime() const {
-  constexpr std::string_view kNames[] = {"t",          "ts",         "time",  "times",
-                                         "timestamp",  "timestamps", "stamp", "time_stamp",
-                                         "time stamp", "event_time"};
-  return std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
-}
-
-std::optional<double> metresOf(std::string_view unit) {
-  if (unit == "m") return 1;
-  if (unit == "cm") return 0.01;
-  if (unit == "mm") return 0.001;
-  return std::nullopt;
-}
-
-HeaderWord headerWord(std::string_view text) {
-  std::string lower;
-  for (const char c : text) {
-    if (c != '"' && c != '\'' && c != '#') {
-      lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-  }
-  HeaderWord word;
-  const std::string_view content = trimmed(lower);
-  const std::size_t bracket = content.find_first_of("[(");
-  word.name = std::string(trimmed(content.substr(0, bracket)));
-  if (bracket != std::string_view::npos) {
-    const std::size_t end = content.find_first_of("])", bracket);
-    const std::size_t length = std::min(end, content.size()) - bracket - 1;
-    word.unit = std::string(trimmed(content.substr(bracket + 1, length)));
-    word.time_exponent = timeExponentOf(word.unit);
-    return word;
-  }
-  // "us" alone is a unit. "s" alone may mean something else.
-  if (const auto unit = word.name.size() > 1 ? timeExponentOf(word.name) : std::nullopt) {
-    return {"t", word.name, unit};
-  }
-  const std::size_t underscore = word.name.rfind('_');
-  if (underscore != std::string::npos) {
-    const std::string unit = word.name.substr(underscore + 1);
-    word.time_exponent = timeExponentOf(unit);
-    if (word.time_exponent || metresOf(unit)) {
-      word.unit = unit;
-      word.name.resize(underscore);
-    }
-  }
-  return word;
 }
 
 }  // namespace efm

@@ -102,9 +102,6 @@ std::string timeUnitOf(int exponent);
 /// Returns the nanoseconds in a unit: 1000 for exponent -6.
 std::int64_t nanosecondsPer(int exponent);
 
-/// Returns the metres in a unit m, cm or mm: 0.001 for "mm"; std::nullopt for other words.
-std::optional<double> metresOf(std::string_view unit);
-
 /// Statistics of the first times in a file that does not name their unit.
 struct TimeSample {
   int count = 0;
@@ -136,7 +133,9 @@ struct UsualRate {
   const char* option;
 };
 inline constexpr UsualRate kUsualEventRate = {"events", 1e3, 3e7, "--time-unit"};
-inline constexpr UsualRate kUsualPoseRate = {"poses", 5, 2000, "--pose-time-unit"};
+inline UsualRate usualPoseRate(const ReaderOptions& options) {
+  return {"poses", 5, 2000, options.pose_unit_option.c_str()};
+}
 
 struct TimeUnit {
   int exponent = 0;
@@ -156,29 +155,18 @@ TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
 
 /// @throws std::runtime_error naming the likely unit if poses with decimals are too rare for
 /// seconds.
-void requireSecondsOfPoses(const TimeSample& sample, const std::string& where);
+void requireSecondsOfPoses(const TimeSample& sample, const std::string& where,
+                           const ReaderOptions& options);
 
 /// Rejects times of poses that are no times, if no unit is given: one time for all poses, as six
 /// written digits of a date give, and the numbers of frames.
 /// @param renumber command that replaces numbers by times; empty: none.
 void requireTimesOfPoses(const TimeSample& sample, const std::string& where,
-                         const std::string& renumber = {});
+                         const ReaderOptions& options, const std::string& renumber = {});
 
 /// Finds the exponent for times of poses. Their option is `pose_time_unit`; `time_unit` holds for
 /// whole numbers. A unit that only the values show is an error, too.
 int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
                      const std::string& where);
-
-/// The name in a word of a header, and the unit in its brackets or after its last underscore:
-/// "#timestamp [ns]" is timestamp and ns, "t_us" is t and us, "microseconds" is t and us, "x_mm" is
-/// x and mm. Both are in lower case.
-struct HeaderWord {
-  std::string name;
-  std::string unit;                  ///< Empty if there is no unit.
-  std::optional<int> time_exponent;  ///< Exponent of a unit of time.
-
-  bool isTime() const;
-};
-HeaderWord headerWord(std::string_view text);
 
 }  // namespace efm

@@ -5,7 +5,6 @@
 
 #include <fstream>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -35,22 +34,15 @@ std::size_t countCameras(const fs::path& folder) {
 
 /// Returns the size of the first existing image of images.txt; std::nullopt if there is none.
 std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
-  std::ifstream list(folder / "images.txt");
-  std::string line;
-  while (std::getline(list, line)) {
-    std::istringstream fields(line);
-    std::string time;
-    std::string name;
-    if (!(fields >> time >> name) || time[0] == '#') continue;
-    const fs::path file = folder / name;
-    std::error_code ignored;
-    if (!fs::is_regular_file(file, ignored)) continue;
+  if (!isFile(folder / "images.txt")) return std::nullopt;
+  for (const TimedFile& image : timedFilesIn(folder / "images.txt")) {
+    if (!isFile(image.file)) continue;
     try {
-      const cv::Size size = pictureSize(readBytes(file));
+      const cv::Size size = pictureSize(readBytes(image.file));
       return CameraSize{size.width, size.height};
     } catch (const std::runtime_error& error) {
-      throw std::runtime_error(file.string() + ": cannot be read as an image: " + error.what() +
-                               ", as large as the sensor");
+      throw std::runtime_error(image.file.string() + ": cannot be read as an image: " +
+                               error.what() + ", as large as the sensor");
     }
   }
   return std::nullopt;
@@ -96,26 +88,31 @@ void addFolderFiles(const fs::path& folder, const ReaderOptions& options, Record
     std::error_code ignored;
     if (options.leaves_out_poses || !parts.poses.empty() || !fs::exists(folder / name, ignored))
       continue;
-    parts.poses = requirePoses(readPoseText(folder / name, options), folder / name);
+    parts.poses = readPoseText(folder / name, options, &parts.notes);
   }
 }
 
-std::vector<TruthDepth> truthOfFolder(const fs::path& folder) {
-  const fs::path index = folder / "depth" / "index.txt";
-  std::vector<TruthDepth> truth;
-  std::ifstream stream(index);
+std::vector<TimedFile> timedFilesIn(const fs::path& list) {
+  std::vector<TimedFile> files;
+  std::ifstream stream(list);
+  if (!stream) throw std::runtime_error(list.string() + ": cannot be opened for reading");
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     const auto words = splitWords(std::string_view(line).substr(0, line.find('#')));
     if (words.empty()) continue;
     const auto t_ns = parseSeconds(words[0]);
-    if (!t_ns || words.size() != 2) {
-      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time and the name of a file",
-                                           index.string(), number, inQuotes(line)));
+    if (!t_ns || words.size() < 2) {
+      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time in seconds and a file",
+                                           list.string(), number, inQuotes(line)));
     }
-    truth.push_back({*t_ns, index.parent_path() / words[1]});
+    files.push_back({*t_ns, list.parent_path() / words[1]});
   }
-  return truth;
+  return files;
+}
+
+std::vector<TimedFile> truthOfFolder(const fs::path& folder) {
+  const fs::path index = folder / "depth" / "index.txt";
+  return isFile(index) ? timedFilesIn(index) : std::vector<TimedFile>();
 }
 
 bool looksLikeUzhFolder(const fs::path& folder) { return isFile(eventFileIn(folder)); }
@@ -136,8 +133,7 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
     parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
   if (!options.leaves_out_poses && fs::exists(folder / "groundtruth.txt", ignored)) {
-    parts.poses =
-        requirePoses(readPoseText(folder / "groundtruth.txt", options), folder / "groundtruth.txt");
+    parts.poses = readPoseText(folder / "groundtruth.txt", options, &parts.notes);
   }
   addFolderFiles(folder, options, parts);
   return parts;

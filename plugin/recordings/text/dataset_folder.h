@@ -13,7 +13,7 @@ namespace efm {
 ///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
 ///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
-///   depth/index.txt   the truth, optional: t file, depth maps of camera 0 (see TruthDepth)
+///   depth/index.txt   the truth, optional: t file, depth maps of camera 0 (see TimedFile)
 /// Other files are ignored. Events of a camera that camchain.yaml does not have are an error.
 
 /// Returns whether the folder has a camchain.yaml, or events in cam0.
@@ -28,8 +28,12 @@ RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folde
 void addFolderFiles(const std::filesystem::path& folder, const ReaderOptions& options,
                     RecordingParts& parts);
 
+/// Reads a list of files, in its order: a line is `t file`, with t in decimal seconds and the file
+/// relative to the list's folder. A # begins a comment.
+std::vector<TimedFile> timedFilesIn(const std::filesystem::path& list);
+
 /// Returns the depth maps in depth/index.txt, one line `t file` each; none without this file.
-std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
+std::vector<TimedFile> truthOfFolder(const std::filesystem::path& folder);
 
 /// The text layout of the UZH event camera dataset (Mueggler et al., IJRR 2017), one camera:
 ///   events.txt        t x y p; other names and columns: `eventFileIn`, `findEventColumns`

@@ -18,17 +18,6 @@ namespace {
 
 constexpr std::size_t kSampledLines = 5000;
 
-/// Returns a line's separator. If it has semicolons, its commas are decimal commas.
-char separatorOf(std::string_view line) {
-  if (line.find(';') != std::string_view::npos) return ';';
-  return line.find(',') != std::string_view::npos ? ',' : ' ';
-}
-
-bool hasNumber(const std::vector<std::string_view>& fields) {
-  return std::any_of(fields.begin(), fields.end(),
-                     [](std::string_view field) { return parseNumber<double>(field).has_value(); });
-}
-
 bool isComplete(const std::string& order) {
   return std::all_of(
              kEventColumns.begin(), kEventColumns.end(),
@@ -36,71 +25,17 @@ bool isComplete(const std::string& order) {
          std::count(order.begin(), order.end(), 'c') <= 1;
 }
 
-bool isComment(std::string_view line) {
-  return !line.empty() && (line.front() == '#' || line.front() == '%');
-}
-
-/// Facts about the lines before the first event.
-struct Header {
-  bool named = false;               // a line names the columns
-  std::string_view not_understood;  // a line of unknown words
-};
-
-/// Takes order and unit from a line of names. Keeps both if the line does not name all columns.
-/// @return whether the line names all columns.
-bool takeNames(std::string_view line, EventColumns& columns) {
-  if (isComment(line)) line = trimmed(line.substr(1));
+/// Returns a letter per name of a header.
+std::string orderOfNames(const std::vector<HeaderWord>& names) {
   std::string order;
-  std::optional<int> exponent;
-  for (const std::string_view field : eventFields(line, separatorOf(line))) {
-    const HeaderWord word = headerWord(field);
-    order += eventColumnOf(word);
-    if (order.back() == 't') exponent = word.time_exponent;
-  }
-  if (!isComplete(order)) return false;
-  columns.order = order;
-  if (exponent) columns.time_exponent = *exponent;
-  return true;
+  for (const HeaderWord& word : names) order += word.isTime() ? '-' : eventColumnOf(word);
+  const auto time = timeColumnsOf(names, "");
+  if (time) order[time->column] = 't';
+  if (time && time->nanoseconds) order[*time->nanoseconds] = 'n';
+  return order;
 }
 
-}  // namespace
-
-std::string orderOfOption(const std::string& text) {
-  std::string order;
-  for (const std::string_view word : splitWords(text, " ,")) order += word;
-  if (isComplete(order) && order.find_first_not_of("txypc-") == std::string::npos) return order;
-  throw std::runtime_error(
-      fmt::format("--event-columns {}: expected t, x, y and p, each once, c for a column with the "
-                  "camera, and - "
-                  "for a column to ignore",
-                  inQuotes(text)));
-}
-
-namespace {
-
-/// Skips the lines before the first event. @return the rest of the text.
-std::string_view takeHeader(std::string_view text, EventColumns& columns, Header& header) {
-  for (std::uint64_t lines = 0; !text.empty();) {
-    const std::string_view rest = text;
-    const std::string_view line = trimmed(takeLine(text));
-    ++lines;
-    const bool comment = isComment(line);
-    const std::vector<std::string_view> fields = eventFields(line, separatorOf(line));
-    if (line.empty()) continue;
-    std::optional<CameraSize> size;
-    if (!comment && fields.size() == 2) size = cameraSizeOf(fields[0], fields[1]);
-    if (!comment && !size && hasNumber(fields)) return rest;
-    if (size && (columns.size || text.empty())) return rest;
-    if (size) columns.size = size;
-    if (!size && takeNames(line, columns)) {
-      header.named = true;
-    } else if (!size && !comment && fields.size() >= 4) {
-      header.not_understood = line;
-    }
-    columns.header_lines = lines;
-  }
-  return {};
-}
+bool namesEvents(const std::vector<HeaderWord>& names) { return isComplete(orderOfNames(names)); }
 
 std::string asWords(const std::string& order) { return fmt::format("{}", fmt::join(order, " ")); }
 
@@ -125,20 +60,6 @@ EventRows numbersOf(const TextRows& lines) {
   return rows;
 }
 
-/// Warns of a header that is not understood, if the lines have the expected number of columns.
-void warnOfHeader(const TextRows& rows, const Header& header, const std::string& file,
-                  EventColumns& columns) {
-  if (header.not_understood.empty() || rows.empty() ||
-      rows.front().size() != columns.order.size()) {
-    return;
-  }
-  const std::string words = asWords(columns.order);
-  columns.warnings = {
-      {"event-columns", fmt::format("{}: the header {} is not understood: the columns are read as "
-                                    "{} (--event-columns \"{}\")",
-                                    file, inQuotes(header.not_understood), words, words)}};
-}
-
 TimeSample timesIn(const TextRows& rows, const EventColumns& columns) {
   const std::size_t t_column = columns.order.find('t');
   TimeSample sample;
@@ -151,70 +72,76 @@ TimeSample timesIn(const TextRows& rows, const EventColumns& columns) {
   return sample;
 }
 
-/// The first line with numbers.
-struct FirstEvent {
-  std::uint64_t line = 0;
-  std::string_view text;
-  std::vector<std::string_view> fields;
-  std::string order;  // the header's order, else the usual order
-};
+/// The beginning of a text, made plain, and its first rows.
+struct EventText {
+  std::string text;
+  TextTable table;
+  std::string order = EventColumns().order;  // the header's order, else the usual order
+  std::optional<CameraSize> size;
+  TextRows rows;
 
-std::optional<FirstEvent> firstEventOf(std::string_view beginning) {
-  if (beginning.find('\0') != std::string_view::npos) return std::nullopt;
-  EventColumns columns;
-  Header ignored;
-  std::string_view rest = takeHeader(beginning, columns, ignored);
-  FirstEvent first;
-  if (rest.empty()) return std::nullopt;
-  const std::string_view before = beginning.substr(0, beginning.size() - rest.size());
-  first.line = 1 + static_cast<std::uint64_t>(std::count(before.begin(), before.end(), '\n'));
-  first.text = trimmed(takeLine(rest));
-  first.fields = eventFields(first.text, separatorOf(first.text));
-  first.order = columns.order;
-  return first;
-}
-
-/// Returns whether the numbers between blanks or semicolons have decimal commas.
-bool hasDecimalCommas(std::string_view line) {
-  const std::vector<std::string_view> fields = splitWords(line, " \t;");
-  bool any = false;
-  for (const std::string_view field : fields) {
-    std::string number(field);
-    const std::size_t comma = number.find(',');
-    const bool decimal = comma != std::string::npos && comma + 1 < number.size();
-    if (decimal) number[comma] = '.';
-    any = any || decimal;
-    if (!numberOf(number)) return false;
+  explicit EventText(std::string beginning) : text(std::move(beginning)) {
+    table = findTable(text, namesEvents);
+    char* const end = text.data() + text.size();
+    table.makePlain(end - table.rows.size(), end);
+    if (!table.names.empty()) order = orderOfNames(table.names);
+    std::string_view before(text.data(), text.size() - table.rows.size());
+    while (!before.empty() && !size) {
+      const auto fields = splitWords(takeLine(before), " \t\r,;");
+      if (fields.size() == 2) size = cameraSizeOf(fields[0], fields[1]);
+    }
+    for (std::string_view rest = table.rows; rows.size() < kSampledLines && !rest.empty();) {
+      rows.push_back(table.fieldsOf(takeLine(rest)));
+    }
   }
-  return any && fields.size() >= 4;
-}
+};
 
 }  // namespace
 
-std::vector<std::string_view> eventFields(std::string_view line, char separator) {
-  return separator == ' ' ? splitWords(line) : splitFields(line, {&separator, 1});
+std::string orderOfOption(const std::string& text) {
+  std::string order;
+  for (const std::string_view word : splitWords(text, " ,")) order += word;
+  if (isComplete(order) && order.find_first_not_of("txypc-") == std::string::npos) return order;
+  throw std::runtime_error(
+      fmt::format("--event-columns {}: expected t, x, y and p, each once, c for a column with the "
+                  "camera, and - "
+                  "for a column to ignore",
+                  inQuotes(text)));
 }
 
-EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& options,
+EventColumns findEventColumns(std::string beginning, const ReaderOptions& options,
                               const std::string& file) {
-  constexpr int kUnknown = 1;
+  const EventText text(std::move(beginning));
   EventColumns columns;
-  columns.time_exponent = kUnknown;
-  Header header;
-  std::string_view rest = takeHeader(beginning, columns, header);
-  TextRows rows;
-  for (std::size_t k = 0; k < kSampledLines && !rest.empty(); ++k) {
-    const std::string_view line = trimmed(takeLine(rest));
-    if (k == 0) columns.separator = separatorOf(line);
-    rows.push_back(eventFields(line.substr(0, line.find('#')), columns.separator));
+  columns.table = text.table;
+  columns.table.header = columns.table.rows = {};
+  columns.order = text.order;
+  columns.size = text.size;
+  const bool named = !text.table.names.empty();
+  if (!options.columns.empty() || !named) {
+    columns.order = findColumnOrder(numbersOf(text.rows), options, file, columns.warnings);
   }
-  if (!options.columns.empty() || !header.named) {
-    columns.order = findColumnOrder(numbersOf(rows), options, file, columns.warnings);
-    if (options.columns.empty()) warnOfHeader(rows, header, file, columns);
+  if (options.columns.empty() && !named && !text.rows.empty() && text.table.header_line > 0 &&
+      text.rows.front().size() == columns.order.size()) {
+    const std::string words = asWords(columns.order);
+    columns.warnings = {
+        {"event-columns", fmt::format("{}: the header {} is not understood: the columns are read "
+                                      "as {} (--event-columns \"{}\")",
+                                      file, inQuotes(text.table.header), words, words)}};
   }
-  if (!options.time_unit.empty()) columns.time_exponent = *timeExponentOf(options.time_unit);
-  if (columns.time_exponent == kUnknown) {
-    TimeUnit unit = findTimeUnit(options, timesIn(rows, columns), kUsualEventRate, file);
+  const std::size_t t = columns.order.find('t');
+  const std::size_t ns = columns.order.find('n');
+  if (ns < columns.order.size() && !text.rows.empty()) {
+    const auto& row = text.rows.front();
+    if (row.size() == columns.order.size() && !nanosecondsIn(row[t], row[ns]))
+      columns.order[ns] = '-';
+  }
+  if (!options.time_unit.empty()) {
+    columns.time_exponent = *timeExponentOf(options.time_unit);
+  } else if (named && t < text.table.names.size() && text.table.names[t].time_exponent) {
+    columns.time_exponent = *text.table.names[t].time_exponent;
+  } else {
+    TimeUnit unit = findTimeUnit(options, timesIn(text.rows, columns), kUsualEventRate, file);
     columns.time_exponent = unit.exponent;
     if (unit.warning) columns.warnings.push_back(std::move(*unit.warning));
   }
@@ -222,52 +149,30 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
 }
 
 bool looksLikeEventLines(std::string_view beginning, const std::string& option) {
-  const std::optional<FirstEvent> first = firstEventOf(beginning);
-  if (!first) return false;
-  const std::size_t count = first->fields.size();
-  std::string order = first->order;
+  if (beginning.find('\0') != std::string_view::npos) return false;
+  const EventText text{std::string(beginning)};
+  if (text.rows.empty()) return false;
+  const std::size_t count = text.rows.front().size();
+  std::string order = text.order;
   if (!option.empty() && option.find('=') == std::string::npos) {
     order = orderOfOption(option);
   } else if (count == 4 && order.size() != 4) {
     order = "txyp";
-  } else if (count == 8) {
+  } else if (count == 8 && text.table.names.empty()) {
     return false;  // a pose
   }
   if (count != order.size()) return false;
   for (std::size_t k = 0; k < count; ++k) {
-    const bool any = order[k] == 'c' || (order[k] == '-' && !option.empty());
-    if (!any && !numberOf(first->fields[k])) return false;
+    if (kEventColumns.find(order[k]) == std::string_view::npos) continue;
+    if (!numberOf(text.rows.front()[k])) return false;
   }
   return true;
 }
 
-std::optional<std::string> whyNoEventLines(std::string_view beginning) {
-  const std::optional<FirstEvent> first = firstEventOf(beginning);
-  if (!first) return std::nullopt;
-  const auto why = [&](const std::string& what) {
-    return fmt::format("{}: {}: {}", first->line, inQuotes(first->text), what);
-  };
-  if (hasDecimalCommas(first->text)) {
-    return why("decimal commas: expected decimal points (tr , . <FILE >NEW)");
-  }
-  const std::size_t count = first->fields.size();
-  const auto numbers =
-      std::count_if(first->fields.begin(), first->fields.end(),
-                    [](std::string_view field) { return numberOf(field).has_value(); });
-  if (2 * static_cast<std::size_t>(numbers) < count) return std::nullopt;  // prose
-  if (count == 12) return why(kPosesWithoutTimes);
-  if (count != first->order.size()) {
-    return why(fmt::format(
-        "expected {} fields, {}, not {} (other columns: --event-columns, - for one to ignore)",
-        first->order.size(), asWords(first->order), count));
-  }
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::string_view field = first->fields[k];
-    if (numberOf(field) || first->order[k] == 'c') continue;
-    return why(fmt::format("{} = {}: expected {}", first->order[k], inQuotes(field),
-                           first->order[k] == 'p' ? kExpectedPolarity : "a number"));
-  }
-  return std::nullopt;
+bool hasEventTable(std::string_view beginning) {
+  const EventText text{std::string(beginning)};
+  return beginning.find('\0') == beginning.npos &&
+         (!text.rows.empty() || !text.table.names.empty());
 }
 
 std::optional<int> polarityOf(std::string_view text) {

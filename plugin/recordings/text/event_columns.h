@@ -11,6 +11,7 @@
 
 #include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
+#include "plugin/recordings/text/text_table.h"
 
 namespace efm {
 
@@ -32,18 +33,18 @@ struct ColumnOrder {
 /// @return std::nullopt if the values show no order, or several orders.
 std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::string& expected);
 
-/// The positions of an event's numbers in a line of text.
+/// The positions of an event's numbers in a row of a text.
 struct EventColumns {
-  /// A letter per column; 'c' for the camera's name, '-' for a column to ignore.
+  /// A letter per column; 'c' for the camera's name, 'n' for nanoseconds beside seconds, '-' for a
+  /// column to ignore.
   std::string order = "txyp";
-  char separator = ' ';            ///< ' ', ',' or ';'. Blanks always separate, too.
+  TextTable table;                 ///< Without its texts.
   int time_exponent = 0;           ///< The unit of times is 10^time_exponent s.
-  std::uint64_t header_lines = 0;  ///< Number of lines to skip at the beginning.
   std::optional<CameraSize> size;  ///< Size in a first line `width height`.
   std::vector<Warning> warnings;   ///< Set if only the values show order or unit.
 
   /// True for t x y p in seconds, separated by blanks.
-  bool isUsual() const { return order == "txyp" && separator == ' ' && time_exponent == 0; }
+  bool isUsual() const { return order == "txyp" && table.separator == ' ' && time_exponent == 0; }
 };
 
 /// Finds the columns from the beginning of a file. A first line with names (t or time …, x or col
@@ -54,7 +55,7 @@ struct EventColumns {
 /// @param file name of the file, for errors.
 /// @throws std::runtime_error if `--event-columns` is wrong or contradicts the values, if the order
 /// is likely but not certain, or if the unit of time is not certain (`findTimeUnit`).
-EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& options,
+EventColumns findEventColumns(std::string beginning, const ReaderOptions& options,
                               const std::string& file);
 
 /// Returns whether the beginning of a file is text whose first line with numbers is an event: it
@@ -62,9 +63,8 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
 /// @param option value of `--event-columns`.
 bool looksLikeEventLines(std::string_view beginning, const std::string& option = {});
 
-/// Describes why a text with numbers has no events, with the number of the line: "3: '1 2 3':
-/// expected 4 fields …"; std::nullopt if the first line with numbers has more words than numbers.
-std::optional<std::string> whyNoEventLines(std::string_view beginning);
+/// Returns whether a text has rows of numbers, or a header of events.
+bool hasEventTable(std::string_view beginning);
 
 /// Returns 0, 1 or -1, also of "1.0"; 1 for "true" and "on", 0 for "false" and "off", in any case.
 std::optional<int> polarityOf(std::string_view text);
@@ -99,9 +99,6 @@ std::string orderOfOption(const std::string& text);
 /// @return std::nullopt if the option has no `=`.
 /// @throws std::runtime_error if the option does not name each column once.
 std::optional<EventNames> eventNamesOf(const std::string& option);
-
-/// Splits a line into fields, at separators and blanks.
-std::vector<std::string_view> eventFields(std::string_view line, char separator);
 
 /// Returns the text for the expected value of a pixel. @param found the value that is no pixel.
 inline std::string expectedPixel(double found) {

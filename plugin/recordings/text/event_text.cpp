@@ -16,6 +16,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/time_unit.h"
+#include "plugin/recordings/text/pose_text.h"
 
 namespace efm {
 namespace {
@@ -48,6 +49,14 @@ bool takeBlanks(const char*& text) {
 
 /// Moves `text` past a separator and the blanks around it. @return whether there was one.
 bool takeSeparator(const char*& text, char separator) {
+  if (separator == '\t') {  // a field between two tabs may be empty
+    while (*text == ' ') ++text;
+    if (*text != separator) return false;
+    do {
+      ++text;
+    } while (*text == ' ');
+    return true;
+  }
   const bool any = takeBlanks(text);
   if (separator == ' ') return any;
   if (*text != separator) return false;
@@ -140,12 +149,13 @@ std::vector<std::string> camerasIn(const std::filesystem::path& file, const Even
     ended = count < wanted;
     const std::string_view text(block.data(), carried + count);
     std::string_view lines = wholeLines(text, ended);
+    columns.table.makePlain(block.data(), block.data() + lines.size());
     carried = text.size() - lines.size();
     if (lines.empty()) break;  // the reader of events rejects so long a line
     while (!lines.empty()) {
       const std::string_view line = trimmed(takeLine(lines));
-      if (++line_number <= columns.header_lines) continue;
-      const auto fields = eventFields(line.substr(0, line.find('#')), columns.separator);
+      if (++line_number <= columns.table.lines_before) continue;
+      const auto fields = columns.table.fieldsOf(line);
       if (fields.size() != columns.order.size()) continue;
       if (last == counts.end() || fields[column] != last->first) {
         last = counts.try_emplace(std::string(fields[column])).first;
@@ -179,7 +189,7 @@ EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions
   ended_ = carried_ < kFirstBytes;
   const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
   requireTextLines(first, name());
-  columns_ = findEventColumns(wholeLines(first, ended_), options, name());
+  columns_ = findEventColumns(std::string(wholeLines(first, ended_)), options, name());
   usual_ = columns_.isUsual();
 }
 
@@ -200,6 +210,8 @@ bool EventTextStream::read(std::vector<Event>& events) {
   if (first_byte_ == 0 && line_ == 0) text = withoutByteOrderMark(text);
   const std::size_t newline = text.rfind('\n');
   const std::size_t whole = newline == std::string_view::npos ? 0 : newline + 1;
+  char* const begin = block_.data() + (text.data() - block_.data());
+  columns_.table.makePlain(begin, begin + (ended_ ? text.size() : whole));
   takeLines(text.data(), text.data() + whole, events);
   carried_ = text.size() - whole;
   if (ended_ && carried_ > 0) {
@@ -235,7 +247,7 @@ void EventTextStream::takeLines(const char* begin, const char* end, std::vector<
 
 void EventTextStream::takeLine(std::string_view line, bool unterminated,
                                std::vector<Event>& events) {
-  const bool header = first_byte_ == 0 && line_ <= columns_.header_lines;
+  const bool header = first_byte_ == 0 && line_ <= columns_.table.lines_before;
   try {
     if (const auto event = header ? std::nullopt : parseLine(line, unterminated)) {
       events.push_back(*event);
@@ -260,14 +272,15 @@ const char* EventTextStream::parsePlainLine(const char* text, Event& event, bool
   } else {
     const int decimals_of_ns = 9 + columns_.time_exponent;
     for (std::size_t k = 0; k < columns_.order.size(); ++k) {
-      if (k > 0 && !takeSeparator(text, columns_.separator)) return nullptr;
+      if (k > 0 && !takeSeparator(text, columns_.table.separator)) return nullptr;
       const char column = columns_.order[k];
       const char* const begin = text;
       const bool taken = column == 't'   ? takeTime(text, decimals_of_ns, event)
                          : column == 'x' ? takePixel(text, event.x)
                          : column == 'y' ? takePixel(text, event.y)
                          : column == 'p' ? takePolarity(text, event.polarity)
-                                         : takeIgnored(text, columns_.separator);
+                         : column == 'n' ? false
+                                         : takeIgnored(text, columns_.table.separator);
       if (!taken) return nullptr;
       if (column != 'c') continue;
       const std::string_view camera(begin, static_cast<std::size_t>(text - begin));
@@ -281,7 +294,7 @@ const char* EventTextStream::parsePlainLine(const char* text, Event& event, bool
 
 std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unterminated) const {
   const std::string_view content = line.substr(0, line.find('#'));
-  const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
+  const std::vector<std::string_view> fields = columns_.table.fieldsOf(line);
   if (fields.empty()) return std::nullopt;
   const std::size_t camera = columns_.order.find('c');
   if (camera < fields.size() && !isOfCamera(fields[camera])) {
@@ -297,10 +310,11 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
                                          place(line_), inQuotes(content), names()));
   }
   if (fields.size() != count) {
-    throw std::runtime_error(fmt::format(
-        "{}: {}: expected {} fields, {}, not {} (other columns: --event-columns, - for one to "
-        "ignore)",
-        place(line_), inQuotes(content), count, names(), fields.size()));
+    throw std::runtime_error(
+        fmt::format("{}: {}: expected {} fields, {}, not {} ({})", place(line_), inQuotes(content),
+                    count, names(), fields.size(),
+                    fields.size() == 12 ? kPosesWithoutTimes
+                                        : "other columns: --event-columns, - for one to ignore"));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
@@ -317,7 +331,12 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
                            expectedPixel(number.value_or(0))));
   };
   const std::string_view time = field_of('t');
-  const std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);
+  std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);
+  if (const std::size_t n = columns_.order.find('n'); t_ns && n < fields.size()) {
+    const auto part_ns = nanosecondsIn(time, fields[n]);
+    if (!part_ns) throw fail("nanoseconds", fields[n], "0 to 999999999, after whole seconds");
+    *t_ns += *part_ns;
+  }
   if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
     throw fail("t", time,
                columns_.time_exponent == 0 ? "a time in decimal seconds" : "a decimal time");
@@ -342,6 +361,7 @@ std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEven
   std::array<char, 4096> bytes{};
   content_.seek(byte);
   const std::string_view text(bytes.data(), content_.read(bytes.data(), bytes.size()));
+  columns_.table.makePlain(bytes.data(), bytes.data() + text.size());
   for (std::size_t begin = text.find('\n'); begin != std::string_view::npos;) {
     ++begin;
     const std::size_t newline = text.find('\n', begin);
@@ -399,14 +419,14 @@ std::string EventTextStream::commandInOrder() const {
   const std::size_t column = columns_.order.find('t') + 1;
   const bool plain = content_.seekableBytes() > 0;
   const std::string separator =
-      columns_.separator == ' ' ? "" : fmt::format(" -t'{}'", columns_.separator);
+      columns_.table.separator == ' ' ? "" : fmt::format(" -t'{}'", columns_.table.separator);
   const std::string sort = fmt::format("sort{} -g -k{},{} -s", separator, column, column);
-  if (columns_.header_lines == 0) {
+  if (columns_.table.lines_before == 0) {
     return plain ? sort + " FILE >NEW" : "zcat FILE | " + sort + " >NEW";
   }
   return fmt::format("({} FILE | head -n {}; {} FILE | tail -n +{} | {}) >NEW",
-                     plain ? "cat" : "zcat", columns_.header_lines, plain ? "cat" : "zcat",
-                     columns_.header_lines + 1, sort);
+                     plain ? "cat" : "zcat", columns_.table.lines_before, plain ? "cat" : "zcat",
+                     columns_.table.lines_before + 1, sort);
 }
 
 std::string EventTextStream::commandOfCamera() const {
@@ -422,8 +442,8 @@ std::string EventTextStream::commandOfCamera() const {
       "{} has the events of several cameras in column {}; one alone: {}awk{} '{{c = ${}; "
       "gsub(/[^a-zA-Z0-9._-]/, \"\", c)}} NR <= {} || c == \"{}\"'{} >NEW",
       name(), column, plain ? "" : "zcat FILE | ",
-      columns_.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.separator), column,
-      columns_.header_lines, camera, plain ? " FILE" : "");
+      columns_.table.separator == ' ' ? "" : fmt::format(" -F'{}'", columns_.table.separator),
+      column, columns_.table.lines_before, camera, plain ? " FILE" : "");
 }
 
 std::string EventTextStream::place(std::uint64_t line) const {

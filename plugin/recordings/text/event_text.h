@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/files/file_content.h"
 #include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/event_columns.h"
 

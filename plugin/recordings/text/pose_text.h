@@ -16,22 +16,27 @@ inline constexpr const char* kPosesWithoutTimes =
     "a "
     ".npz file with N times and N x 4 x 4 matrices";
 
-/// Reads text, also compressed, with a line per pose T_world_body:
+/// Reads text, also compressed, with a row per pose T_world_body:
 ///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;
 ///   columns in any order      if a header names them: EuRoC's CSV (#timestamp [ns], p_RS_R_x [m],
-///                             …, q_RS_w [], …), TUM-VIE's mocap_data.txt (microseconds).
-/// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. If the
-/// header has no unit, whole numbers have the unit of the option: see `findTimeUnit`.
-/// @return the poses in the order of the file; there may be none.
+///                             …, q_RS_w [], …), TUM-VIE's mocap_data.txt (microseconds), topics
+///                             of ROS (%time, field.header.stamp, sec and nanosec), PlotJuggler,
+///                             OptiTrack's Motive, …; other columns are ignored.
+/// Times are exact. If the header has no unit, whole numbers have the unit of the option: see
+/// `findTimeUnit`. Rows whose pose is empty or NaN are left out.
+/// @param notes receives the number of these rows; may be null.
+/// @return the poses in the order of the file, at least one.
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
-                                      const ReaderOptions& options);
+                                      const ReaderOptions& options,
+                                      std::vector<Warning>* notes = nullptr);
+
+/// Reads the cameras' poses of nerfstudio's transforms.json: `frames`, each with transform_matrix,
+/// 4 x 4, and a time (timestamp, time, t_ns, …). The matrix is of OpenGL's camera (y up, z
+/// backward); the pose is that of ours (y down, z forward).
+std::vector<StampedPose> readPoseFrames(const std::filesystem::path& file,
+                                        const ReaderOptions& options);
 
 /// Returns whether the complete lines at the beginning of a file are poses.
 bool looksLikePoseLines(std::string_view beginning);
-
-/// Returns the poses.
-/// @throws std::runtime_error if there are none.
-std::vector<StampedPose> requirePoses(std::vector<StampedPose> poses,
-                                      const std::filesystem::path& file);
 
 }  // namespace efm

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/app/program.h"
 #include "test/plugin/program_test.h"
 
@@ -50,7 +51,7 @@ class AppTest : public ProgramTest {
   }
   std::vector<StampedPose> posesIn(const std::string& name,
                                    const std::string& file = "trajectory.txt") const {
-    return readTumTrajectory(folder() / name / file);
+    return readPoses(folder() / name / file);
   }
   cv::Mat image(const std::filesystem::path& file) const {
     return cv::imread((folder() / file).string(), cv::IMREAD_UNCHANGED);

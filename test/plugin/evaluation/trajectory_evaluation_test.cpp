@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
@@ -122,7 +123,7 @@ TEST_F(EvaluateTrajectory, TheTableAndTheJsonSayTheSame) {
 }
 
 TEST_F(EvaluateTrajectory, TheTableSaysWhatItComparesIn80Columns) {
-  std::vector<StampedPose> truth = readPosesFile(helix("gt.txt"));
+  std::vector<StampedPose> truth = readPoses(helix("gt.txt"));
   truth.resize(30);
   write("data/poses.txt", truth);
   helix("out/trajectory.txt", {Eigen::Quaterniond::Identity(), {1, -2, 3}});

@@ -496,7 +496,7 @@ TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
   write("up.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
   save(observationsOnly(Says::kOdometry), "odometry.rawlog");
   mapOf("odometry.rawlog --hand-eye up.yaml");
-  EXPECT_NEAR(readTumTrajectory(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7,
+  EXPECT_NEAR(readPoses(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7,
               1e-9);
   const Result result = run("import odometry.rawlog --out r.rawlog --hand-eye up.yaml");
   EXPECT_EQ(result.status, 0);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/session/health_checks.h"
 
 #include <gmock/gmock.h>
@@ -278,7 +279,7 @@ TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {
                               Measured{"tumvie_desk2.txt", 600, 1.5, 0.02},
                               Measured{"mvsec_indoor_flying1.txt", 226, 1.5, 0.5},
                               Measured{"dsec_zurich_city_04.txt", 555, 10, 0.5}}) {
-    const std::vector<StampedPose> poses = readTumTrajectory(folder / row.file);
+    const std::vector<StampedPose> poses = readPoses(folder / row.file);
     EXPECT_EQ(namesOf(poses, row.focal_px, row.depth_m), Names()) << row.file;
     std::vector<StampedPose> jump = poses;
     for (std::size_t i = poses.size() / 3; i < poses.size(); ++i) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/studies/frames/posed_frames.h"
 
 #include <algorithm>
@@ -68,7 +69,7 @@ CameraModel uzhCamera(const fs::path& folder) {
 PosedFrames readUzhFrames(const fs::path& folder) {
   const CameraModel camera = uzhCamera(folder);
   Trajectory trajectory;
-  for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) trajectory.add(pose);
+  for (const StampedPose& pose : readPoses(folder / "groundtruth.txt")) trajectory.add(pose);
 
   const fs::path list = folder / "images.txt";
   const FrameUndistortion undistort(camera);

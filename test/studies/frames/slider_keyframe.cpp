@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/studies/frames/slider_keyframe.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@ SliderRecording readSlider(const std::filesystem::path& folder) {
   SliderRecording recording;
   const CameraModel camera = uzhCamera(folder);
   recording.rig.cameras.push_back({camera, {}, 0});
-  for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) {
+  for (const StampedPose& pose : readPoses(folder / "groundtruth.txt")) {
     recording.trajectory.add(pose);
   }
   const std::int64_t first_pose_ns = recording.trajectory.poses().front().t_ns;

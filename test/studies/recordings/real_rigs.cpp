@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/studies/recordings/real_rigs.h"
 
 #include <string>
@@ -18,7 +19,7 @@ std::filesystem::path need(const std::filesystem::path& file) {
 Simulation simulate(const StudyRun& run, const std::string& rig, const std::string& trajectory,
                     const TrajectorySimulationOptions& options) {
   return makeTrajectorySimulation(
-      options, readTumTrajectory(need(run.data / "trajectories" / trajectory)),
+      options, readPoses(need(run.data / "trajectories" / trajectory)),
       readCamchain(need(run.data / "calibration" / rig / "camchain.yaml")));
 }
 

@@ -74,7 +74,10 @@ class RosMessage {
 inline std::string eventArray(RosBytes kind, const std::vector<Event>& events,
                               const std::string& frame = "cam") {
   RosMessage message(kind);
-  message.header(events.empty() ? 0 : events.front().t_ns, frame).u32(260).u32(346).u32(events.size());
+  message.header(events.empty() ? 0 : events.front().t_ns, frame)
+      .u32(260)
+      .u32(346)
+      .u32(events.size());
   for (const Event& event : events) {
     message.u16(event.x).u16(event.y).time(event.t_ns).u8(event.polarity ? 1 : 0);
   }
@@ -132,12 +135,12 @@ inline std::string poseStamped(RosBytes kind, std::int64_t t_ns, const Rigid3& T
   return RosMessage(kind).header(t_ns, "world").pose(T).bytes();
 }
 
-inline std::string cameraInfo(RosBytes kind, const std::string& model,
-                              const std::vector<double>& D) {
+inline std::string cameraInfo(RosBytes kind, const std::string& model, const std::vector<double>& D,
+                              const std::vector<std::uint32_t>& area = {0, 0, 0, 0, 0, 0}) {
   RosMessage message(kind);
   message.header(0).u32(260).u32(346).text(model).u32(D.size()).numbers(D);
   message.numbers({226.5, 0, 173, 0, 227.5, 130, 0, 0, 1}).numbers(std::vector<double>(9 + 12));
-  for (int i = 0; i < 6; ++i) message.u32(0);
+  for (const std::uint32_t value : area) message.u32(value);
   return message.u8(0).bytes();
 }
 

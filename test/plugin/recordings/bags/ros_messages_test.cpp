@@ -222,10 +222,10 @@ TEST(RosMessages, PathsAndTransformsHaveManyPoses) {
     ASSERT_EQ(transforms.size(), 3U);
     for (const std::size_t i : {0, 2}) {
       EXPECT_EQ(transforms[i].parent + " " + transforms[i].child, "map base");
-      EXPECT_TRUE(isSame(rigidOf(transforms[i].numbers), T));
+      EXPECT_TRUE(isSame(transformOf(transforms[i].numbers), T));
     }
-    EXPECT_THAT(errorOf([&] { rigidOf(transforms[1].numbers); }),
-                HasSubstr("orientation of length 0"));
+    EXPECT_THAT(errorOf([&] { transformOf(transforms[1].numbers); }),
+                HasSubstr("qx qy qz qw of length 0"));
     EXPECT_EQ(transforms[2].t_ns, 3);
   }
   EXPECT_EQ(rosTypeOf("tf2_msgs/TFMessage"), RosType::kTransforms);
@@ -257,6 +257,25 @@ TEST(RosMessages, CameraInfoGivesTheModel) {
       EXPECT_EQ(model.width, 346);
       EXPECT_EQ(model.height, 260);
     }
+  }
+}
+
+TEST(RosMessages, CameraInfoOfAPartOfTheSensorGivesTheModelOfItsPixels) {
+  for (const RosBytes kind : kKinds) {
+    // binning_x, binning_y, x_offset, y_offset, height, width
+    const CameraModel model =
+        decodeCameraInfo(messageOf(cameraInfo(kind, "", {}, {2, 4, 100, 20, 200, 240}), kind));
+    EXPECT_EQ(model.width, 120);
+    EXPECT_EQ(model.height, 50);
+    EXPECT_EQ(model.fx, 226.5 / 2);
+    EXPECT_EQ(model.fy, 227.5 / 4);
+    EXPECT_EQ(model.cx, (173 - 100 - 0.5) / 2);
+    EXPECT_EQ(model.cy, (130 - 20 - 1.5) / 4);
+    EXPECT_THAT(
+        errorOf([&] {
+          decodeCameraInfo(messageOf(cameraInfo(kind, "", {}, {0, 0, 200, 0, 0, 240}), kind));
+        }),
+        HasSubstr("240 pixels from 200 on"));
   }
 }
 
@@ -293,7 +312,7 @@ TEST(RosMessages, WrongValuesAreErrors) {
            {packet, ros1(header().u32(1).u32(1).add(0.0).add(0.0).text("evt3").u8(1)),
             "is_bigendian = 1"},
            {pose, ros1(header().numbers({0, 0, NAN, 0, 0, 0, 1})), "position = nan"},
-           {pose, ros1(header().numbers({0, 0, 0, 0, 0, 0, 0})), "orientation of length 0"},
+           {pose, ros1(header().numbers({0, 0, 0, 0, 0, 0, 0})), "qx qy qz qw of length 0"},
            {cdr, std::string("\0\7\0\0", 4), "CDR header = 0 7"},
            {info, cameraInfo(RosBytes::kRos1, "rational_polynomial", {1, 0, 0, 0, 0, 0, 0, 0}),
             "distortion_model = 'rational_polynomial': expected plumb_bob"},

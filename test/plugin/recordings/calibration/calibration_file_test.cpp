@@ -8,12 +8,15 @@
 
 #include <filesystem>
 #include <iterator>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "mapping/base/number_bytes.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "test/paths.h"
+#include "test/plugin/recordings/columns/zip_file.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -83,7 +86,8 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
   recorded.cameras.pop_back();
   EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }),
               AllOf(HasSubstr("given.txt: 2 cameras: expected 1, as the recording has; `map "),
-                    EndsWith("--set rig.cameras=1` (Python: cameras=[1]) takes the camera 1 (or others of 0 to 1)")));
+                    EndsWith("--set rig.cameras=1` (Python: cameras=[1]) takes the camera 1 (or "
+                             "others of 0 to 1)")));
   EXPECT_THAT(messageOf([&] { calibration.camera(2, std::nullopt); }),
               HasSubstr("given.txt: 2 cameras, but the recording has camera 2: expected one"));
 }
@@ -225,6 +229,119 @@ TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
   EXPECT_EQ(one.cameras[0].model, left);
 }
 
+TEST_F(CalibrationFile, LensAndAreaTravelWithTheFile) {
+  // OpenCV's fisheye lens, below the camera's name as DV writes it, and with fisheye_model.
+  const std::string opencv =
+      replaced(replaced(kCameraInfo, ", 0.5]", "]"), "distortion_model: plumb_bob\n", "");
+  EXPECT_EQ(read(opencv).rig.cameras[0].model.distortion, DistortionModel::kRadtan);
+  for (const char* lens : {"fisheye_model: 1\n", "use_fisheye_model: 1\n", "fisheye_model: true\n",
+                           "distortion_model: Equidistant\nuse_fisheye_model: 0\n"}) {
+    EXPECT_EQ(read(lens + opencv).rig.cameras[0].model.distortion, DistortionModel::kEquidistant)
+        << lens;
+  }
+  const auto xml = [](const std::string& name, const char* fisheye) {
+    return "<?xml version=\"1.0\"?>\n<opencv_storage>\n<" + name +
+           ">\n<camera_matrix "
+           "type_id=\"opencv-matrix\">\n<rows>3</rows>\n<cols>3</cols>\n<dt>d</dt>\n"
+           "<data>226. 0. 173. 0. 227. 133. 0. 0. 1.</data></camera_matrix>\n"
+           "<distortion_coefficients type_id=\"opencv-matrix\">\n<rows>1</rows>\n<cols>4</cols>\n"
+           "<dt>d</dt>\n<data>0.1 0.2 0.3 0.4</data></distortion_coefficients>\n"
+           "<image_width>346</image_width>\n<image_height>260</image_height>\n</" +
+           name + ">\n<use_fisheye_model>" + fisheye +
+           "</use_fisheye_model>\n<type>camera</type>\n</opencv_storage>\n";
+  };
+  const CameraModel plain = read(opencv).rig.cameras[0].model;
+  EXPECT_EQ(read(xml("DVXplorer_DXA00093", "0")).rig.cameras[0].model, plain);
+  EXPECT_EQ(read(xml("DVXplorer_DXA00093", "1")).rig.cameras[0].model.distortion,
+            DistortionModel::kEquidistant);
+  std::string nested = "<?xml version=\"1.0\"?>\n<opencv_storage>\n";
+  for (int i = 0; i < 300'000; ++i) nested += "<a>";
+  EXPECT_THAT(errorOfText(nested), HasSubstr("given.txt: XML of over 100 nested elements"));
+  // Half of the sensor's resolution, and a part of it.
+  std::string info =
+      "width: 346\nheight: 260\nK: [226, 0, 173, 0, 227, 133, 0, 0, 1]\nD: [0.1, 0.2, 0.3, 0.4]\n"
+      "distortion_model: plumb_bob\nbinning_x: 2\nbinning_y: 2\n"
+      "roi: {x_offset: 20, y_offset: 10, height: 200, width: 300, do_rectify: false}\n";
+  CameraModel cut = plain;
+  cut.width = 150;
+  cut.height = 100;
+  cut.fx /= 2;
+  cut.fy /= 2;
+  cut.cx = (173 - 20 - 0.5) / 2;
+  cut.cy = (133 - 10 - 0.5) / 2;
+  EXPECT_EQ(read(info).rig.cameras[0].model, cut);
+  // A pixel of the part is the mean of the sensor's pixels in it.
+  const Eigen::Vector3d p_cam(0.3, -0.2, 1.5);
+  EXPECT_LT((plain.project(p_cam) - (2 * cut.project(p_cam) + Eigen::Vector2d(20.5, 10.5))).norm(),
+            1e-9);
+  EXPECT_THAT(errorOfText(replaced(info, "x_offset: 20", "x_offset: 50")),
+              HasSubstr("roi, binning: 300 pixels from 50 on, 2 in one: expected an area in"));
+  info = replaced(replaced(info, "binning_x: 2", "binning_x: 0"), "binning_y: 2", "binning_y: 0");
+  info = replaced(info, "{x_offset: 20, y_offset: 10, height: 200, width: 300, do_rectify: false}",
+                  "{x_offset: 0, y_offset: 0, height: 0, width: 0}");
+  EXPECT_EQ(read(info).rig.cameras[0].model, plain);
+}
+
+TEST_F(CalibrationFile, MayBeOfBasaltOpenVinsOrNerfstudio) {
+  const std::string camera =
+      R"({"camera_type": "kb4", "intrinsics": {"fx": 50, "fy": 51, "cx": 32, "cy": 24,
+          "k1": 0.1, "k2": 0.02, "k3": 0.003, "k4": 0.0004}})";
+  std::string poses, sizes, cameras;
+  for (int count = 1; count <= 4; ++count) {
+    const std::string comma = count == 1 ? "" : ", ";
+    poses += comma + R"({"px": )" + std::to_string(count) +
+             R"(, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1})";
+    sizes += comma + "[64, 48]";
+    cameras += comma + camera;
+    const Rig rig = read(R"({"value0": {"T_imu_cam": [)" + poses + R"(], "intrinsics": [)" +
+                         cameras + R"(], "resolution": [)" + sizes + "]}}")
+                        .rig;
+    ASSERT_EQ(rig.cameras.size(), static_cast<std::size_t>(count));
+    EXPECT_EQ(rig.cameras.back().model.distortion, DistortionModel::kEquidistant);
+    EXPECT_EQ(rig.cameras.back().T_rig_cam.translation.x(), count - 1);
+  }
+  const std::string chain =
+      replaced(kCamchain, "T_cn_cnm1: [[1, 0, 0, -0.1]", "T_imu_cam: [[1, 0, 0, 0.3]");
+  const Rig rig = read(replaced(chain, "240, 180]}",
+                                "240, 180],\n  T_imu_cam: [[1, 0, 0, 0.2], [0, 1, 0, 0], [0, 0, 1, "
+                                "0], [0, 0, 0, 1]]}"))
+                      .rig;
+  EXPECT_NEAR(rig.cameras.at(1).T_rig_cam.translation.x(), 0.1, 1e-12);
+  const std::string transforms =
+      R"({"w": 346, "h": 260, "fl_x": 226, "fl_y": 227, "cx": 173, "cy": 133, "k1": 0.1, "k2": 0.2,
+          "p1": 0.3, "p2": 0.4, "camera_model": "OPENCV", "frames": []})";
+  EXPECT_EQ(read(transforms).rig.cameras[0].model.distortion, DistortionModel::kRadtan);
+  std::string fisheye = replaced(replaced(transforms, "p1", "k3"), "p2", "k4");
+  EXPECT_EQ(read(replaced(fisheye, "OPENCV", "OPENCV_FISHEYE")).rig.cameras[0].model.coefficients,
+            read(transforms).rig.cameras[0].model.coefficients);
+}
+
+TEST_F(CalibrationFile, MayBeTheArraysOfOpenCvOrItsMatrixAlone) {
+  const std::vector<double> matrix = {226, 0, 173, 0, 227, 133, 0, 0, 1};
+  const std::vector<double> lens = {0.1, 0.2, 0.3, 0.4, 0.5};
+  const CameraModel expected = read(kCameraInfo).rig.cameras[0].model;
+  for (const auto& [k, d] : {std::pair("mtx.npy", "dist.npy"),
+                             {"K.npy", "D.npy"},
+                             {"camera_matrix.npy", "dist_coeffs.npy"}}) {
+    writeZip(folder() / "c.npz", {{k, npyArray("<f8", "(3, 3)", matrix)},
+                                  {d, npyArray("<f8", "(1, 5)", lens)},
+                                  {"rvecs.npy", npyArray("|O", "(1,)", std::vector<double>{0})}});
+    EXPECT_EQ(readCalibration(folder() / "c.npz").camera(0, CameraSize{346, 260}).model, expected)
+        << k;
+  }
+  writeZip(folder() / "c.npz", {{"mtx.npy", npyArray("<f8", "(3, 3)", matrix)},
+                                {"dist.npy", npyArray("<f8", "(4, 1)", std::vector<double>(4))}});
+  EXPECT_THAT(errorOf([&] { readCalibration(folder() / "c.npz"); }),
+              HasSubstr("four coefficients"));
+  writeZip(folder() / "c.npz", {{"a.npy", npyArray("<f8", "(3, 3)", matrix)}});
+  EXPECT_THAT(errorOf([&] { readCalibration(folder() / "c.npz"); }),
+              HasSubstr("c.npz: expected arrays mtx"));
+  const CameraModel bare =
+      read("226 0 173\n0 227 133\n0 0 1\n").camera(0, CameraSize{346, 260}).model;
+  EXPECT_EQ(bare.coefficients, std::vector<double>(5));
+  EXPECT_EQ(bare.fy, 227);
+}
+
 /// TUM-VIE's calibration, without the values of the two frame cameras.
 constexpr const char* kTumVie = R"({"value0": {
 "resolution": [[1, 2], [3, 4], [64, 48], [65, 49]],
@@ -251,8 +368,7 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"200 201\n120 \x1b[2J\n", "given.txt:2: '\\x1b[2J': expected a finite number"},
       {"0 201 120 90 0 0 0 0 0\n", "given.txt: fx = 0: must be finite and above 0"},
       {R"({"value0": {"T_imu_marker": {"px": 1}}})", "given.txt:1: value0: resolution is missing"},
-      {R"({"value0": {"resolution": [[1, 2]]}})",
-       "value0: resolution = a list: expected 4 rows of 2 numbers"},
+      {R"({"value0": {"resolution": [[1, 2]]}})", "value0: intrinsics is missing"},
       {kTumVie, "value0: T_imu_cam[2]: qx qy qz qw of length 1.011: expected a rotation"},
       {replaced(kTumVie, "1.011", "1.009"), "value0: intrinsics[3]: camera_type = 'kb5': expected"},
       {replaced(replaced(kTumVie, "1.011", "1"), "kb5", "kb4"), "intrinsics[3]: intrinsics: fx is"},
@@ -261,13 +377,17 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
        "value0: intrinsics = a list: expected a list of at least 4 items"},
       {replaced(kTumVie, "[64, 48]", "[64, 65536]"),
        ":2: value0: resolution = 65536: expected whole"},
+      {replaced(replaced(kTumVie, "kb4", "ds"), "1.011", "1"),
+       "camera_type = 'ds': expected radtan"},
+      {"mtx: [1, 0, 2, 0, 1, 2, 0, 0, 1]\ndist: [0, 0, 0]\n",
+       "number of distortion coefficients = 3"},
       {replaced(kTumVie, "\"k4\": 4", "\"k4\": \"a\""), "intrinsics: k4 = 'a': expected a finite"},
       {"intrinsics: {cam0: 3}\nextrinsics: {}\n", "intrinsics: cam0: expected keys and values"},
       {"intrinsics: {}\nextrinsics: {}\n", "intrinsics: cam0 is missing"},
       {replaced(kCameraInfo, "plumb_bob", "rational_polynomial"),
        "given.txt:5: distortion_model = 'rational_polynomial': expected radtan"},
       {replaced(kCameraInfo, "133, 0, 0, 1]", "133, 0, 0]"),
-       ":4: camera_matrix: data: 8 numbers: expected 9, fx 0 cx"},
+       ":4: camera_matrix: 8 numbers: expected 9, fx 0 cx"},
       {replaced(kCameraInfo, "260", "260.5"), "image_height = 260.5: expected whole numbers"},
       {replaced(kCameraInfo, ", 0.4, 0.5]", "]"),
        "number of distortion coefficients = 3: must be 4 or 5"},
@@ -291,7 +411,7 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
         "226, 0, 173, 0, 227, 133, 1, 0, 1", "226, 0, 173, 0, 227, 133, 0, 1, 1",
         "226, 0, 173, 0, 227, 133, 0, 0, 2"}) {
     EXPECT_THAT(errorOfText(replaced(kCameraInfo, "226, 0, 173, 0, 227, 133, 0, 0, 1", matrix)),
-                HasSubstr(":4: camera_matrix: data = a matrix with skew"));
+                HasSubstr(":4: camera_matrix = a matrix with skew"));
   }
   EXPECT_EQ(read(ini).rig.cameras[0].model.distortion, DistortionModel::kNone);
   const std::string numbers = "200 201 120 90 0.1 0 0 0 0\n";
@@ -446,14 +566,14 @@ TEST_F(HandEyeFile, MayBeANumpyArrayOrTextOfTheMatrix) {
 }
 
 TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
-  for (const char* text : {"", "5\n", "T_rig_body: 1\n", "0 0 0 0 0 0 1\n"}) {
+  for (const char* text : {"", "5\n", "T_rig_body: 1\n", "0 0 0 0 0 1\n"}) {
     EXPECT_THAT(errorOfText(text),
                 AllOf(HasSubstr("hand_eye.yaml: T_body_rig is missing: expected YAML"),
                       HasSubstr("4 rows of 4 numbers")))
         << text;
   }
   EXPECT_THAT(errorOfText("\nT_body_rig: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n"),
-              HasSubstr("hand_eye.yaml:2: T_body_rig = a list: expected 4 rows of 4 numbers"));
+              HasSubstr("hand_eye.yaml:2: T_body_rig: 12 numbers: expected 4 rows of 4 numbers"));
   EXPECT_THAT(errorOf([&] { readHandEye(folder() / "nowhere"); }),
               HasSubstr("nowhere: cannot be opened"));
   EXPECT_THAT(errorOfText("cam0: {camera_model: pinhole}\n"),
@@ -469,9 +589,29 @@ TEST_F(HandEyeFile, OfEasyHandEyeIsThatOfACameraOnTheHand) {
             1e-12);
   EXPECT_THAT(errorOfText(replaced(text, "true", "false")),
               HasSubstr("parameters: eye_on_hand = 'false': expected true: a camera on the"));
-  writeFile(folder() / "T.npz", "PK\3\4");
-  EXPECT_THAT(errorOf([&] { readHandEye(folder() / "T.npz"); }),
-              HasSubstr("T.npz: an archive, as .npz of NumPy: expected YAML"));
+  // easy_handeye2
+  const char* const second =
+      "parameters: {name: a, calibration_type: eye_in_hand}\ntransform:\n"
+      "  translation: {x: 0.05, y: 0.1, z: 0.2}\n  rotation: {x: 0, y: 0, z: 1, w: 0}\n";
+  EXPECT_TRUE(isSame(read(second), read(text)));
+  EXPECT_THAT(errorOfText(replaced(second, "eye_in_hand", "eye_on_base")),
+              HasSubstr("calibration_type = 'eye_on_base': expected eye_in_hand: a camera on the"));
+}
+
+TEST_F(HandEyeFile, MayBeOfVinsOpenVinsOrSevenNumbers) {
+  const Rigid3 expected =
+      read("T_body_rig: [[0, 0, 1, 0.4], [-1, 0, 0, 0.2], [0, -1, 0, -0.1], [0, 0, 0, 1]]\n");
+  for (const char* text :
+       {"%YAML:1.0\nbody_T_cam0: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n"
+        "   data: [0, 0, 1, 0.4, -1, 0, 0, 0.2, 0, -1, 0, -0.1, 0, 0, 0, 1]\n",
+        "cam0:\n  T_imu_cam:\n  - [0, 0, 1, 0.4]\n  - [-1, 0, 0, 0.2]\n  - [0, -1, 0, -0.1]\n"
+        "  - [0, 0, 0, 1]\n",
+        "0.4 0.2 -0.1 -0.5 0.5 -0.5 0.5\n",
+        "# x y z qx qy qz qw\n0.4,0.2,-0.1,0.5,-0.5,0.5,-0.5\n"}) {
+    expectNear(read(text), expected, 1e-12);
+  }
+  EXPECT_THAT(errorOfText("1 2 3 0 0 0 2\n"),
+              HasSubstr("hand_eye.yaml: qx qy qz qw of length 2: exp"));
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {

@@ -137,9 +137,9 @@ TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongOrMissingValue) {
        "cam1: T_cn_cnm1 = a reflection: expected a rotation"},
       {"- [0, 0, 0, 1]", "- [0, 0, 0.5, 1]",
        "cam1: T_cn_cnm1 = a matrix with another last row: expected 0 0 0 1 there"},
-      {"- [0, 0, 0, 1]\n", "", "cam1: T_cn_cnm1 = a list: expected 4 rows of 4 numbers"},
+      {"- [0, 0, 0, 1]\n", "", "cam1: T_cn_cnm1: 12 numbers: expected 4 rows of 4 numbers"},
       {"- [0, 0, 1, 0.3]", "- [0, 0, 1]",
-       "cam1: T_cn_cnm1: 3 numbers: expected 4 rows of 4 numbers"},
+       "cam1: T_cn_cnm1: 15 numbers: expected 4 rows of 4 numbers"},
   };
   for (const auto& row : cases) {
     EXPECT_THAT(errorOfText(replaced(kCam0 + kCam1, row.from, row.to)),

@@ -61,21 +61,22 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
     std::string error;  // text after the name
   } rows[] = {
       {"e.txt", "0.1 1 2 up\n",
-       ":1: '0.1 1 2 up': p = 'up': expected polarity 0 or 1, or -1 or 1, or True or False, or ON "
-       "or "
-       "OFF"},
-      {"e.txt", "# events\n\n0.1 1 b 0\n", ":3: '0.1 1 b 0': y = 'b': expected a number"},
-      {"e.txt", "0,1 1 2 0\n",
-       ":1: '0,1 1 2 0': decimal commas: expected decimal points (tr , . <FILE >NEW)"},
-      {"e.csv", "t;x;y;p\n0,1;1;2;0\n",
-       ":2: '0,1;1;2;0': decimal commas: expected decimal points (tr , . <FILE >NEW)"},
+       ":1: p = 'up': expected polarity 0 or 1, or -1 or 1, or True or False, or ON or OFF "
+       "(columns "
+       "in another order: --event-columns)"},
+      {"e.txt", "# events\n\n0.1 1 b 0\n",
+       ":3: y = 'b': expected a whole number from 0 to 65535 (columns in another order: "
+       "--event-columns)"},
+      {"e.csv", "t;x;y;p\n", ": there is no event after the header"},
       {"e.txt", "0.1 1 2 0 7\n",
        ":1: '0.1 1 2 0 7': expected 4 fields, t x y p, not 5" + other_columns},
       {"e.csv", "x,y,p,t\n1,2,0\n",
        ":2: '1,2,0': expected 4 fields, x y p t, not 3" + other_columns},
       {"kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n",
-       ":1: '1 0 0 0 0 1 0 0 0 0 1 0': 12 numbers, as poses of KITTI have, which have no times: "
-       "expected t tx ty tz qx qy qz qw, or a .npz file with N times and N x 4 x 4 matrices"},
+       ":1: '1 0 0 0 0 1 0 0 0 0 1 0': expected 4 fields, t x y p, not 12 (12 numbers, as poses of "
+       "KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or a .npz file with N "
+       "times "
+       "and N x 4 x 4 matrices)"},
       {"old.raw", "% date 2020-01-01\n% plugin_name hal\n\0\1\2"s,
        ": a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header: the encoding "
        "of "
@@ -321,7 +322,7 @@ TEST_F(DatasetFolder, ADamagedListOfTheTruthStopsOnlyWhoAsksForIt) {
   source.files = {folder()};
   EXPECT_TRUE(openTruth(source).empty());
   write("depth/index.txt", "# t file\n10.3 a.tiff\n");
-  const std::vector<TruthDepth> truth = openTruth(source);
+  const std::vector<TimedFile> truth = openTruth(source);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_EQ(truth[0].t_ns, 10'300'000'000);
   EXPECT_EQ(truth[0].file, folder() / "depth" / "a.tiff");

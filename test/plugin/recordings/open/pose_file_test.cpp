@@ -182,7 +182,8 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
   } cases[] = {
       {"a.txt", "", "a.txt: an empty file"},
       {"a.txt", "1 2 3\n", "a.txt:1: 3 fields: expected 8, t tx ty"},
-      {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
+      {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n",
+       "a.txt:2: t = 'abc': expected a decimal time"},
       {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
       {"a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 9 0 1 0 0 0 0 1 0\n",
        "a.txt:1: 12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz"},
@@ -201,7 +202,8 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
        "a.npy: row 0: qx qy qz qw of length 3"},
       {"a.npy", npyArray<double>("<f8", "(1, 8)", {1e300, 1, 2, 3, 0, 0, 0, 1}),
        "row 0: t = 1e+300"},
-      {"a.npy", npyArray<double>("<f8", "(1, 8)", {1.5, NAN, 2, 3, 0, 0, 0, 1}), "is not finite"},
+      {"a.npy", npyArray<double>("<f8", "(1, 8)", {1.5, NAN, 2, 3, 0, 0, 0, 1}),
+       "row 0: position = nan: expected a finite number"},
       {"a.gz", "\x1f\x8b garbage", "a.gz: cannot be unpacked"},
       {"a.zip", "PK\x03\x04 garbage", "a.zip: cannot be unpacked"},
   };
@@ -348,7 +350,6 @@ class UnreadFormats : public TemporaryFolder {
 TEST_F(UnreadFormats, AreNamedByTheirFirstBytes) {
   const std::pair<std::string, const char*> cases[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:1\n", "a pointer of git-LFS"},
-      {"% Data file containing CD events.\n% Version 2\n% Height 720\n\x0c\x08", "a DAT file of P"},
       {"#!AER-DAT1.0\r\n", "an AEDAT 1 file: "},
       {"#!AER-DAT2.0\r\n# raw AE data\r\n", "an AEDAT 2 file: "},
       {"#!AER-DAT3.1\r\n", "an AEDAT 3 file: "},

@@ -8,6 +8,7 @@
 #include <random>
 #include <utility>
 
+#include "mapping/base/number_bytes.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/paths.h"
 #include "test/plugin/recordings/sensors/evt_words.h"
@@ -86,6 +87,44 @@ TEST_F(PropheseeRaw, WithoutGeometryTheSizeIsThatOfTheCamera) {
     EXPECT_EQ(size.has_value(), each.width > 0) << each.lines;
     EXPECT_EQ(size.value_or(CameraSize{}).width, each.width) << each.lines;
     EXPECT_EQ(size.value_or(CameraSize{}).height, each.height) << each.lines;
+  }
+}
+
+TEST_F(PropheseeRaw, DatHasAnEventInEightBytes) {
+  const std::string header =
+      "% Data file containing CD events.\n% Version 2\n% Date 2020-01-01 10:00:00\n% Height 720\n"
+      "% Width 1280\n";
+  std::string bytes = header + "\x0c\x08";
+  std::vector<Event> events;
+  // The 32 bits of the time wrap after 71.6 minutes; a late event does not.
+  for (const std::int64_t t_us : {5LL, 1'500'000'000LL, 3'000'000'000LL, 4'294'967'290LL,
+                                  4'294'967'300LL, 4'294'967'294LL, 6'000'000'000LL}) {
+    const auto k = static_cast<std::uint16_t>(events.size());
+    events.push_back({1000 * t_us, static_cast<std::uint16_t>(1279 - k),
+                      static_cast<std::uint16_t>(719 - k), k % 2 == 0});
+    appendLittleEndian(bytes, static_cast<std::uint32_t>(t_us));
+    appendLittleEndian(bytes, static_cast<std::uint32_t>(events.back().x | events.back().y << 14 |
+                                                         (k % 2 == 0 ? 1 : 0) << 28));
+  }
+  writeFile(file(), bytes);
+  ASSERT_NE(detectFormat(file()), nullptr);
+  EXPECT_EQ(detectFormat(file())->name, "raw");
+  const auto stream = streamOf(file());
+  ASSERT_TRUE(stream->size());
+  EXPECT_EQ(stream->size()->width, 1280);
+  EXPECT_EQ(stream->size()->height, 720);
+  stream->seek(7'000'000'000'000);
+  EXPECT_EQ(readStream(*stream), events);
+  EXPECT_EQ(stream->undatedEvents(), 0U);
+  const std::pair<std::string, const char*> errors[] = {
+      {bytes.substr(0, bytes.size() - 3), "5 bytes of a word: expected all 8, but the file ends"},
+      {replaced(bytes, "Version 2", "Version 1"), ":2: Version = '1': expected 2"},
+      {replaced(bytes, "Height 720", "Height 0"), ":4: Height = '0': expected a number of pixels"},
+      {header + "\x0e\x08", "the bytes '\\x0e\\x08' after the header: expected CD events"},
+      {header, "the bytes '' after the header: expected CD events"}};
+  for (const auto& [text, error] : errors) {
+    writeFile(file(), text);
+    EXPECT_THAT(errorOf([&] { readStream(*streamOf(file())); }), HasSubstr(error));
   }
 }
 
@@ -190,8 +229,7 @@ TEST_F(PropheseeRaw, AnEndWithinAWordAndEventsWithoutTimeAreErrors) {
 }
 
 TEST_F(PropheseeRaw, OtherFilesAreNotTakenForIt) {
-  for (const std::string text : {"", "% ", "% Data file containing CD events\n% Version 2\n",
-                                 "0.1 1 2 1\n", "% no evt here\n"}) {
+  for (const std::string text : {"", "% ", "0.1 1 2 1\n", "% no evt here\n"}) {
     writeFile(file(), text);
     EXPECT_FALSE(looksLikePropheseeRaw(file())) << text;
   }
@@ -202,6 +240,13 @@ TEST_F(PropheseeRaw, OtherFilesAreNotTakenForIt) {
 TEST_F(PropheseeRaw, DamagedFilesAreReadOrRejected) {
   std::vector<Event> events = longRecording();
   events.resize(2000);
+  std::string dat =
+      "% Data file containing CD events.\n% Version 2\n% Height 480\n% Width 640\n\x0c\x08";
+  for (const Event& event : events) {
+    appendLittleEndian(dat, static_cast<std::uint32_t>(event.t_ns / 1000));
+    appendLittleEndian(dat, static_cast<std::uint32_t>(event.x | event.y << 14));
+  }
+  readDamaged(dat, file(), "raw");
   for (const RawKind& kind : rawKinds()) {
     readDamaged(kind.header + evtBytes(kind.encoding, events), file(), "raw");
   }

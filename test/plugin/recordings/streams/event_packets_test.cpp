@@ -439,35 +439,6 @@ TEST(TimeUnit, HasNames) {
   EXPECT_EQ(timeExponentOf("m"), std::nullopt);
 }
 
-TEST(HeaderWord, HasANameAndAUnit) {
-  constexpr int kNone = 1;
-  const struct {
-    const char* text;
-    const char* name;
-    const char* unit;
-    int exponent;
-  } rows[] = {
-      {"#timestamp [ns]", "timestamp", "ns", -9},
-      {" \"T_us\" ", "t", "us", -6},
-      {"microseconds", "t", "microseconds", -6},
-      {"x_mm", "x", "mm", kNone},
-      {"Time (MS", "time", "ms", -3},
-      {"x [px]", "x", "px", kNone},
-      {"s", "s", "", kNone},
-      {"ns", "t", "ns", -9},
-      {"time_stamp", "time_stamp", "", kNone},
-      {"pos_x_cm", "pos_x", "cm", kNone},
-      {"[s]", "", "s", 0},
-      {"'p'", "p", "", kNone},
-  };
-  for (const auto& row : rows) {
-    const HeaderWord word = headerWord(row.text);
-    EXPECT_EQ(word.name, row.name) << row.text;
-    EXPECT_EQ(word.unit, row.unit) << row.text;
-    EXPECT_EQ(word.time_exponent.value_or(kNone), row.exponent) << row.text;
-  }
-}
-
 }  // namespace
 
 }  // namespace efm

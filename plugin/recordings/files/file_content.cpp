@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/files/file_content.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/text/text_table.h"
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/time_unit.h"
+
+namespace efm {
+namespace {
+
+bool isLetterOrDigit(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
+
+std::vector<std::string_view> splitAt(std::string_view line, char separator) {
+  return separator == ' ' ? splitWords(line) : splitFields(line, {&separator, 1});
+}
+
+/// Parses a number, which may be in quotes, have a decimal comma, or a comma after it.
+bool isNumber(std::string_view field) {
+  if (!field.empty() && field.back() == ',') field.remove_suffix(1);
+  std::string plain;
+  for (const char c : field) {
+    if (c != '"') plain += c == ',' ? '.' : c;
+  }
+  return parseNumber<double>(plain).has_value();
+}
+
+/// Returns the separator of a line of at least four fields. Commas within numbers between blanks
+/// are decimal commas, also where a comma and a blank separate the numbers.
+char separatorOf(std::string_view line) {
+  if (line.find(';') != line.npos) return ';';
+  if (line.find(',') == line.npos) return ' ';
+  const std::vector<std::string_view> words = splitWords(line);
+  bool decimal = false;
+  for (const std::string_view word : words) {
+    const std::size_t comma = word.find(',');
+    if (comma >= word.size() - 1) continue;  // none, or at the end
+    if (!isNumber(word)) return ',';
+    decimal = true;
+  }
+  return decimal && words.size() >= 4 ? ' ' : ',';
+}
+
+bool isRow(const std::vector<std::string_view>& fields) {
+  const auto numbers = std::count_if(fields.begin(), fields.end(), isNumber);
+  return fields.size() >= 3 && 2 * static_cast<std::size_t>(numbers) >= fields.size();
+}
+
+/// Returns the names in a header's fields. In "t [us]" with a blank, the unit is no field.
+std::vector<HeaderWord> namesIn(const std::vector<std::string_view>& fields, char separator) {
+  std::vector<HeaderWord> names;
+  for (const std::string_view field : fields) {
+    HeaderWord word = headerWord(field);
+    if (separator == ' ' && word.name.empty() && !word.unit.empty() && !names.empty()) {
+      names.back().unit = word.unit;
+      names.back().time_exponent = word.time_exponent;
+    } else {
+      names.push_back(std::move(word));
+    }
+  }
+  return names;
+}
+
+/// Takes units from a line that has nothing else. @return whether it has.
+bool takeUnits(const std::vector<std::string_view>& fields, std::vector<HeaderWord>& names) {
+  std::vector<std::string> units;
+  for (const std::string_view field : fields) {
+    const HeaderWord word = headerWord(field);
+    const std::string& unit = word.unit.empty() ? word.name : word.unit;
+    const bool known = metresOf(unit) || timeExponentOf(unit);
+    if (!known && !word.name.empty() && word.name != "-") return false;
+    units.push_back(known ? unit : "");
+  }
+  if (units.size() != names.size()) return false;
+  for (std::size_t k = 0; k < units.size(); ++k) {
+    if (units[k].empty()) continue;
+    names[k].unit = units[k];
+    names[k].time_exponent = timeExponentOf(units[k]);
+  }
+  return true;
+}
+
+/// The lines of a header so far, field by field.
+struct HeaderLines {
+  std::vector<std::string> stacked;  // of the lines with the same number of fields
+  std::vector<HeaderWord> last;
+  bool several = false;
+
+  void add(const std::vector<std::string_view>& fields) {
+    several = stacked.size() == fields.size();
+    if (!several) stacked.assign(fields.size(), {});
+    last.clear();
+    for (std::size_t k = 0; k < fields.size(); ++k) {
+      stacked[k] += (stacked[k].empty() ? "" : " ") + std::string(fields[k]);
+      last.push_back(headerWord(fields[k]));
+    }
+  }
+  std::vector<HeaderWord> names() const {
+    std::vector<HeaderWord> words;
+    for (std::size_t k = 0; several && k < last.size(); ++k) {
+      words.push_back(last[k].isTime() ? last[k] : headerWord(stacked[k]));
+    }
+    return words;
+  }
+};
+
+}  // namespace
+
+TextTable findTable(std::string_view text, bool (*takes)(const std::vector<HeaderWord>&)) {
+  constexpr int kNumbersInHeader =
+      8;  // rows with words, before a header: numbers of a mocap's markers
+  TextTable table;
+  HeaderLines lines;
+  int rows = 0;
+  std::uint64_t number = 0;
+  while (!text.empty()) {
+    const std::string_view from = text;
+    const std::string_view line = trimmed(takeLine(text));
+    ++number;
+    if (line.empty()) continue;
+    const bool comment = isComment(line);
+    const std::string_view content = comment ? trimmed(line.substr(1)) : line;
+    const char separator = separatorOf(content);
+    const std::vector<std::string_view> fields = splitAt(content, separator);
+    const std::size_t count = table.names.size();
+    const bool has_number = std::any_of(fields.begin(), fields.end(), isNumber);
+    if (!comment && (count > 0 ? has_number : isRow(fields))) {
+      if (table.rows.empty()) {
+        table.rows = from;
+        table.lines_before = number - 1;
+        table.separator = separator;
+        if (count > 1 && splitAt(line, '\t').size() == count) table.separator = '\t';
+      }
+      if (count > 0 || ++rows > kNumbersInHeader ||
+          std::all_of(fields.begin(), fields.end(), isNumber)) {
+        break;
+      }
+      lines.add(fields);
+      continue;
+    }
+    if (count > 0 && (takeUnits(fields, table.names) || comment)) continue;
+    if (!comment) lines.add(fields);
+    const auto key = std::find_if(fields.begin(), fields.end(), [](std::string_view field) {
+      return headerWord(field).name == "length units";
+    });
+    if (key != fields.end() && std::next(key) != fields.end()) {
+      table.length_unit = headerWord(*std::next(key)).name;
+    }
+    for (std::vector<HeaderWord> names :
+         {comment ? std::vector<HeaderWord>() : lines.names(),
+          namesIn(splitAt(content, '\t'), '\t'), namesIn(fields, separator)}) {
+      if (!takes(names)) continue;
+      table.names = std::move(names);
+      table.header = line;
+      table.header_line = number;
+      table.rows = {};
+      break;
+    }
+    if (table.names.empty() && table.rows.empty() && fields.size() >= 3 && !comment) {
+      table.header = line;
+      table.header_line = number;
+    }
+  }
+  if (table.rows.empty()) table.lines_before = table.names.empty() ? 0 : table.header_line;
+  table.decorated = table.rows.find('"') != table.rows.npos ||
+                    (table.separator != ',' && table.rows.find(',') != table.rows.npos);
+  return table;
+}
+
+std::vector<std::string_view> TextTable::fieldsOf(std::string_view line) const {
+  return splitAt(trimmed(line.substr(0, line.find('#'))), separator);
+}
+
+void TextTable::makePlain(char* begin, char* end) const {
+  if (!decorated) return;
+  bool quoted = false;
+  for (char* c = begin; c != end; ++c) {
+    const bool decimal = c + 1 != end && std::isdigit(static_cast<unsigned char>(c[1])) != 0;
+    if (*c == '\n') quoted = false;
+    if (*c == '"') {
+      quoted = !quoted;
+      *c = ' ';
+    } else if (*c == ',' && (quoted || separator != ',')) {
+      *c = decimal ? '.' : quoted ? '_' : separator == ' ' ? ' ' : ',';
+    } else if (quoted && (*c == separator || *c == ' ')) {
+      *c = '_';
+    }
+  }
+}
+
+std::string TextTable::awk() const {
+  return separator == ' ' ? "awk" : std::string("awk -F'") + separator + "'";
+}
+
+bool HeaderWord::isTime() const {
+  constexpr std::string_view kNames[] = {"t",          "ts",         "time",  "times",
+                                         "timestamp",  "timestamps", "stamp", "time_stamp",
+                                         "time stamp", "event_time"};
+  const std::string last = name.substr(name.find_last_of("./") + 1);
+  const std::size_t begin = std::min(last.find_first_not_of('_'), last.size());
+  return std::find(std::begin(kNames), std::end(kNames), last.substr(begin)) != std::end(kNames);
+}
+
+std::vector<std::string_view> HeaderWord::parts() const {
+  std::vector<std::string_view> found;
+  for (std::size_t begin = 0; begin < name.size();) {
+    std::size_t end = begin;
+    while (end < name.size() && isLetterOrDigit(name[end])) ++end;
+    if (end > begin) found.emplace_back(name.data() + begin, end - begin);
+    begin = end + 1;
+  }
+  return found;
+}
+
+std::optional<TimeColumns> timeColumnsOf(const std::vector<HeaderWord>& names,
+                                         const std::string& beside) {
+  std::optional<TimeColumns> best;
+  std::pair<bool, std::ptrdiff_t> best_rank;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (!names[k].isTime()) continue;
+    const std::string& name = names[k].name;
+    const auto common = std::mismatch(name.begin(), name.end(), beside.begin(), beside.end()).first;
+    const std::pair rank(name.find("stamp") != std::string::npos, common - name.begin());
+    if (best && rank <= best_rank) continue;
+    best = TimeColumns{k, names[k].time_exponent, {}};
+    best_rank = rank;
+  }
+  for (std::size_t k = 0; best && best->exponent == 0 && k < names.size(); ++k) {
+    if (names[k].name == names[best->column].name && names[k].time_exponent == -9) {
+      best->nanoseconds = k;
+    }
+  }
+  return best;
+}
+
+std::optional<std::int64_t> nanosecondsIn(std::string_view seconds, std::string_view nanoseconds) {
+  const auto ns = parseNumber<std::int64_t>(nanoseconds);
+  const bool is_part = ns && *ns >= 0 && *ns < kNanosecondsPerSecond;
+  return is_part && parseNumber<std::int64_t>(seconds) ? ns : std::nullopt;
+}
+
+std::optional<double> metresOf(std::string_view unit) {
+  constexpr struct {
+    double metres;
+    std::string_view names;  // each between blanks
+  } kUnits[] = {{1, " m meter meters metre metres "},
+                {0.01, " cm centimeter centimeters centimetre centimetres "},
+                {0.001, " mm millimeter millimeters millimetre millimetres "}};
+  if (unit.empty() || unit.find(' ') != unit.npos) return std::nullopt;
+  for (const auto& [metres, names] : kUnits) {
+    if (names.find(" " + std::string(unit) + " ") != names.npos) return metres;
+  }
+  return std::nullopt;
+}
+
+HeaderWord headerWord(std::string_view text) {
+  std::string lower;
+  for (const char c : text) {
+    if (std::string_view("\"'#%").find(c) == std::string_view::npos) {
+      lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  HeaderWord word;
+  const std::string_view content = trimmed(lower);
+  const std::size_t bracket = content.find_first_of("[(");
+  word.name = std::string(trimmed(content.substr(0, bracket)));
+  if (word.name == "field.header.stamp") return {word.name, "ns", -9};  // rostopic echo -p
+  if (bracket != std::string_view::npos) {
+    const std::size_t end = content.find_first_of("])", bracket);
+    const std::size_t length = std::min(end, content.size()) - bracket - 1;
+    word.unit = std::string(trimmed(content.substr(bracket + 1, length)));
+    word.time_exponent = timeExponentOf(word.unit);
+    return word;
+  }
+  // "us" alone is a unit. "s" alone may mean something else.
+  const std::size_t last = word.name.find_last_of("./") + 1;
+  const std::string part = word.name.substr(last);
+  if (const auto exponent = part.size() > 1 ? timeExponentOf(part) : std::nullopt) {
+    return {word.name.substr(0, last) + "t", part, exponent};
+  }
+  const std::size_t underscore = word.name.rfind('_');
+  if (underscore != std::string::npos) {
+    const std::string unit = word.name.substr(underscore + 1);
+    word.time_exponent = timeExponentOf(unit);
+    if (word.time_exponent || metresOf(unit)) {
+      word.unit = unit;
+      word.name.resize(underscore);
+    }
+  }
+  return word;
+}
+
+}  // namespace efm
