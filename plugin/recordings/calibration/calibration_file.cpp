@@ -213,12 +213,15 @@ Calibration readCalibration(const std::filesystem::path& file) {
   const std::string text = readText(file);
   if (looksLikeIni(text)) return {file, readMrptCameras(text, file)};
   if (text.compare(0, 2, "PK") == 0) return readCameraArrays(file);
-  if (!parseNumber<double>(firstWord(text))) return readYamlCalibration(file);
+  std::string first = firstWord(text);
+  if (!first.empty() && first.find_first_of(",;") != first.npos)
+    first.resize(first.find_first_of(",;"));
+  if (!parseNumber<double>(first)) return readYamlCalibration(file);
   return readUzhCalibration(file);
 }
 
 Calibration readUzhCalibration(const std::filesystem::path& file) {
-  const std::vector<double> numbers = numbersIn(readText(file), file);
+  const std::vector<double> numbers = numbersIn(readText(file), file, " \t\r,;");
   const bool sized = numbers.size() == 11;
   if (numbers.size() != 9 && !sized) {
     throw std::runtime_error(
@@ -226,6 +229,10 @@ Calibration readUzhCalibration(const std::filesystem::path& file) {
                     file.string(), numbers.size()));
   }
   const std::vector<double>& n = numbers;
+  if (!sized && n[3] == 0 && n[6] == 0 && n[7] == 0 && n[8] == 1 && n[1] != 0) {
+    throw std::runtime_error(file.string() +
+                             ": a matrix with skew: expected fx 0 cx, 0 fy cy, 0 0 1");
+  }
   CameraModel model = !sized && isCameraMatrix(n)
                           ? radtanLens(file, {n[0], n[4], n[2], n[5]}, std::vector<double>(5))
                           : radtanLens(file, n, {n.begin() + 4, n.begin() + 9});
@@ -268,6 +275,10 @@ Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibra
   } else if (npy) {
     for (const auto& [name, array] : arraysIn(file)) {
       if (array.size() != 16 && array.size() != 7) continue;
+      if (name.rfind("t_cam", 0) == 0) {
+        throw std::runtime_error(
+            fmt::format("{}: {}: expected its inverse, T_body_rig", file.string(), name));
+      }
       if (!numbers.empty())
         throw std::runtime_error(file.string() + ": two transforms: expected one");
       numbers = array;
@@ -275,8 +286,11 @@ Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibra
   } else if (text.find_first_of(":{<") == std::string::npos) {
     numbers = numbersIn(text, file, " \t\r,;[]");
   }
-  if (numbers.size() == 7 || numbers.size() == 16) {
+  if (!numbers.empty()) {
+    const bool other_order = text.find("qw") < text.find("qx") || text.find("[cm]") != text.npos ||
+                             text.find("[mm]") != text.npos;
     try {
+      if (other_order) throw std::runtime_error("expected x y z qx qy qz qw, in metres");
       return transformOf(numbers);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
@@ -287,6 +301,10 @@ Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibra
     const YamlEntry entry(file.string(), "", root);
     for (const char* key : {"T_body_rig", "body_T_cam0"}) {
       if (entry.has(key)) return entry.transform(key);
+    }
+    if (entry.has("extrinsicRotation")) {  // VINS-Mono
+      const std::vector<double> p = entry.numbers("extrinsicTranslation", 3, "3, x y z");
+      return {entry.rotation("extrinsicRotation"), {p[0], p[1], p[2]}};
     }
     if (entry.has("transformation") || entry.has("transform")) return readEasyHandEye(entry);
     if (entry.has("T_lidar_camRect1")) return readDsecHandEye(entry, calibration);

@@ -68,6 +68,11 @@ constexpr CameraForm kBasalt = {"intrinsics: fx fy cx cy", false, nullptr, "came
 constexpr CameraForm kDv = {
     "focalLength principalPoint", false, "resolution", "distortionModel", nullptr,
     "distortionCoefficients"};
+/// transforms.json of nerfstudio.
+constexpr CameraForm kNerfFisheye = {"fl_x fl_y cx cy", false,   "w h",
+                                     "camera_model",    nullptr, "k1 k2 k3 k4"};
+constexpr CameraForm kNerf = {"fl_x fl_y cx cy", false,    "w h",
+                              "camera_model",    "opencv", "k1 k2 p1 p2 k3 k4"};
 constexpr CameraForm kMrpt = {"fx fy cx cy", false, "resolution", "distortion_model distortion",
                               "plumb_bob",   "dist"};
 
@@ -82,9 +87,6 @@ constexpr std::pair<const char*, CameraForm> kOneCamera[] = {
       "distortion_coefficients"}},
     // The arrays of OpenCV's tutorial, see `readCalibration`
     {"mtx", {"mtx", true, nullptr, "distortion_model", "plumb_bob", "dist"}},
-    // transforms.json of nerfstudio
-    {"k4", {"fl_x fl_y cx cy", false, "w h", "camera_model", "opencv_fisheye", "k1 k2 k3 k4"}},
-    {"fl_x", {"fl_x fl_y cx cy", false, "w h", "camera_model", "opencv", "k1 k2 p1 p2"}},
     // Messages of CameraInfo as text, of ROS 1 and 2
     {"K", {"K", true, "width height", "distortion_model", nullptr, "D"}},
     {"k", {"k", true, "width height", "distortion_model", nullptr, "d"}},
@@ -122,6 +124,7 @@ std::vector<double> numbersAt(const YamlEntry& entry, const char* keys, std::siz
   if (names.size() == 1) return place.numbers(names[0].c_str(), count, expected);
   std::vector<double> all;
   for (const std::string& name : names) {
+    if ((name == "k3" || name == "k4") && !place.has(name.c_str())) continue;  // 0
     if (place.sizeOf(name.c_str()) == 0) {
       all.push_back(place.number(name.c_str()));
       continue;
@@ -177,7 +180,10 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
     k = {k[0], k[4], k[2], k[5]};
   }
   CameraModel model{size.width, size.height, k[0], k[1], k[2], k[3], lens, {}};
-  if (form.size != nullptr) {
+  const bool sized =
+      form.size != nullptr &&
+      (form.default_lens == nullptr || entry.has(placeOf(entry, form.size).second[0].c_str()));
+  if (sized) {
     const std::vector<double> sides = numbersAt(entry, form.size, 2, "2, width height");
     setSensorSize(entry, form.size, sides[0], sides[1], model);
   }
@@ -203,10 +209,9 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
     model = cutTo(area, model);
   }
   try {
-    CameraModel sized = model;
-    if (form.size == nullptr && model.width == 0)
-      sized.width = sized.height = 1;  // not in the file
-    sized.validate();
+    CameraModel whole = model;
+    if (!sized && model.width == 0) whole.width = whole.height = 1;  // not in the file
+    whole.validate();
   } catch (const std::invalid_argument& error) {
     throw entry.fail(error.what());
   }
@@ -308,6 +313,10 @@ std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file) {
 }
 
 std::optional<CameraModel> readOneCamera(const YamlEntry& root) {
+  if (root.has("fl_x")) {
+    const bool fisheye = root.has("camera_model") && root.text("camera_model") == "OPENCV_FISHEYE";
+    return readCamera(root, fisheye ? kNerfFisheye : kNerf);
+  }
   for (const auto& [found, form] : kOneCamera) {
     if (hasPlace(root, found)) return readCamera(root, form);
   }

@@ -29,6 +29,10 @@ struct PoseArrays {
   std::shared_ptr<NpyArray> rotations = nullptr;
 };
 
+std::string stemOf(const std::string& member) {
+  return std::filesystem::path(member).stem().string();
+}
+
 Rigid3 poseOf(const PoseArrays& arrays, std::uint64_t row) {
   std::vector<double> numbers;
   for (const auto& array : {arrays.poses, arrays.rotations}) {
@@ -36,10 +40,17 @@ Rigid3 poseOf(const PoseArrays& arrays, std::uint64_t row) {
       numbers.push_back(NpyArray::columnOf(array, k).number(row));
     }
   }
-  if (arrays.rotations && arrays.rotations->name().find("wxyz") != std::string::npos) {
+  const auto has = [&](const char* word) {
+    return arrays.rotations && arrays.rotations->name().find(word) != std::string::npos;
+  };
+  if (has("wxyz") || has("w_first") || has("scalar_first")) {
     std::rotate(numbers.begin() + 3, numbers.begin() + 4, numbers.end());
   }
-  return transformOf(numbers);
+  Rigid3 T_world_body = transformOf(numbers);
+  if (arrays.rotations) {
+    T_world_body.translation *= metresOf(headerWord(stemOf(arrays.poses->name())).unit).value_or(1);
+  }
+  return T_world_body;
 }
 
 std::string shapeOf(const NpyArray& array) {
@@ -62,10 +73,6 @@ Kind kindOf(const NpyArray& array) {
     if (shape.size() == 2 && shape[1] == columns) return kind;
   }
   return Kind::kOther;
-}
-
-std::string stemOf(const std::string& member) {
-  return std::filesystem::path(member).stem().string();
 }
 
 bool namesTimes(const std::string& member) { return headerWord(stemOf(member)).isTime(); }
@@ -96,6 +103,10 @@ PoseArrays openPoseArrays(const std::filesystem::path& file) {
       shape = "(no numbers)";  // EVIMO2's meta: Python objects
     }
     all += (all.empty() ? "" : ", ") + member + " " + shape;
+    if (stemOf(member) == "w2c" || stemOf(member) == "world_to_camera") {
+      throw std::runtime_error(
+          fmt::format("{}: {}: expected its inverse, T_world_body", file.string(), member));
+    }
   }
   // Opens the member of a kind: the only one, or the only one with a fitting name.
   const auto open = [&](Kind kind, const char* what, bool (*has_name)(const std::string&)) {

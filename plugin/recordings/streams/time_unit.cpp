@@ -67,9 +67,9 @@ std::optional<int> timeExponentOf(std::string_view unit) {
     int exponent;
     std::string_view names;  // each between blanks
   } kUnits[] = {{0, " s sec secs second seconds "},
-                {-3, " ms msec msecs millisecond milliseconds "},
-                {-6, " us µs μs usec usecs microsecond microseconds "},
-                {-9, " ns nsec nsecs nanosec nanosecs nanosecond nanoseconds "}};
+                {-3, " ms msec msecs millis millisec millisecond milliseconds "},
+                {-6, " us µs μs usec usecs micros microsec microsecond microseconds "},
+                {-9, " ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds "}};
   if (unit.empty() || unit.find(' ') != std::string_view::npos) return std::nullopt;
   for (const auto& [exponent, names] : kUnits) {
     if (names.find(fmt::format(" {} ", unit)) != std::string_view::npos) return exponent;
@@ -147,10 +147,9 @@ void requireSecondsOfPoses(const TimeSample& sample, const std::string& where,
                            const ReaderOptions& options) {
   constexpr int kEnough = 10;
   constexpr double kFarTooRare = 0.01;  // poses per second
-  if (sample.count < kEnough || sample.latest <= sample.earliest ||
-      rateOf(sample, 0) >= kFarTooRare) {
-    return;
-  }
+  const bool too_rare =
+      sample.count >= kEnough && sample.latest > sample.earliest && rateOf(sample, 0) < kFarTooRare;
+  if (!too_rare && fitsTime(sample, 0)) return;
   throw std::runtime_error(fmt::format("{}: {} poses take {:.3g} of a unit that is not seconds: {}",
                                        where, sample.count, sample.latest - sample.earliest,
                                        guessOf(sample, usualPoseRate(options))));

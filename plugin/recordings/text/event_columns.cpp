@@ -22,7 +22,8 @@ bool isComplete(const std::string& order) {
   return std::all_of(
              kEventColumns.begin(), kEventColumns.end(),
              [&](char column) { return std::count(order.begin(), order.end(), column) == 1; }) &&
-         std::count(order.begin(), order.end(), 'c') <= 1;
+         std::count(order.begin(), order.end(), 'c') <= 1 &&
+         std::count(order.begin(), order.end(), 'n') <= 1;
 }
 
 /// Returns a letter per name of a header.
@@ -31,7 +32,7 @@ std::string orderOfNames(const std::vector<HeaderWord>& names) {
   for (const HeaderWord& word : names) order += word.isTime() ? '-' : eventColumnOf(word);
   const auto time = timeColumnsOf(names, "");
   if (time) order[time->column] = 't';
-  if (time && time->nanoseconds) order[*time->nanoseconds] = 'n';
+  if (time && time->parts) order[*time->parts] = 'n';
   return order;
 }
 
@@ -101,11 +102,10 @@ struct EventText {
 std::string orderOfOption(const std::string& text) {
   std::string order;
   for (const std::string_view word : splitWords(text, " ,")) order += word;
-  if (isComplete(order) && order.find_first_not_of("txypc-") == std::string::npos) return order;
+  if (isComplete(order) && order.find_first_not_of("txypcn-") == std::string::npos) return order;
   throw std::runtime_error(
-      fmt::format("--event-columns {}: expected t, x, y and p, each once, c for a column with the "
-                  "camera, and - "
-                  "for a column to ignore",
+      fmt::format("--event-columns {}: expected t, x, y and p, each once, n for nanoseconds beside "
+                  "seconds, c for a column with the camera, and - for a column to ignore",
                   inQuotes(text)));
 }
 
@@ -118,6 +118,18 @@ EventColumns findEventColumns(std::string beginning, const ReaderOptions& option
   columns.order = text.order;
   columns.size = text.size;
   const bool named = !text.table.names.empty();
+  const std::string other = orderOfNames(text.table.other_names);
+  if (options.columns.empty() && !named && !text.rows.empty() &&
+      std::count(other.begin(), other.end(), '-') + 2 <=
+          static_cast<std::ptrdiff_t>(other.size())) {
+    for (const char column : kEventColumns) {
+      if (std::count(other.begin(), other.end(), column) == 1) continue;
+      throw std::runtime_error(
+          fmt::format("{}:{}: {}: there is no one column {}: expected one each of t, x, y and p "
+                      "(--event-columns)",
+                      file, text.table.header_line, inQuotes(text.table.header), column));
+    }
+  }
   if (!options.columns.empty() || !named) {
     columns.order = findColumnOrder(numbersOf(text.rows), options, file, columns.warnings);
   }
@@ -133,13 +145,23 @@ EventColumns findEventColumns(std::string beginning, const ReaderOptions& option
   const std::size_t ns = columns.order.find('n');
   if (ns < columns.order.size() && !text.rows.empty()) {
     const auto& row = text.rows.front();
-    if (row.size() == columns.order.size() && !nanosecondsIn(row[t], row[ns]))
-      columns.order[ns] = '-';
+    if (named && options.columns.empty())
+      columns.parts_exponent = *text.table.names[ns].time_exponent;
+    const bool whole = row.size() == columns.order.size() &&
+                       nanosecondsIn(row[t], row[ns], columns.parts_exponent);
+    if (!whole) columns.order[ns] = '-';
   }
   if (!options.time_unit.empty()) {
     columns.time_exponent = *timeExponentOf(options.time_unit);
-  } else if (named && t < text.table.names.size() && text.table.names[t].time_exponent) {
-    columns.time_exponent = *text.table.names[t].time_exponent;
+  } else if (columns.order.find('n') != std::string::npos) {
+    columns.time_exponent = 0;
+  } else if (named && t < text.table.names.size() && !text.table.names[t].unit.empty()) {
+    const HeaderWord& word = text.table.names[t];
+    if (!word.time_exponent) {
+      throw std::runtime_error(fmt::format("{}:{}: the unit {} of t: expected s, ms, us or ns",
+                                           file, text.table.header_line, inQuotes(word.unit)));
+    }
+    columns.time_exponent = *word.time_exponent;
   } else {
     TimeUnit unit = findTimeUnit(options, timesIn(text.rows, columns), kUsualEventRate, file);
     columns.time_exponent = unit.exponent;

@@ -35,11 +35,12 @@ std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::strin
 
 /// The positions of an event's numbers in a row of a text.
 struct EventColumns {
-  /// A letter per column; 'c' for the camera's name, 'n' for nanoseconds beside seconds, '-' for a
-  /// column to ignore.
+  /// A letter per column; 'c' for the camera's name, 'n' for parts of a second beside whole
+  /// seconds, '-' for a column to ignore.
   std::string order = "txyp";
   TextTable table;                 ///< Without its texts.
   int time_exponent = 0;           ///< The unit of times is 10^time_exponent s.
+  int parts_exponent = -9;         ///< That of 'n'.
   std::optional<CameraSize> size;  ///< Size in a first line `width height`.
   std::vector<Warning> warnings;   ///< Set if only the values show order or unit.
 
@@ -91,8 +92,8 @@ using EventNames = std::array<std::string, 4>;
 bool hasAll(const EventNames& names);
 
 /// Returns the letters in `--event-columns "t x y p"`.
-/// @throws std::runtime_error unless they are t, x, y and p, each once, c at most once, and - for
-/// ignored columns.
+/// @throws std::runtime_error unless they are t, x, y and p, each once, c and n (nanoseconds beside
+/// seconds) at most once, and - for ignored columns.
 std::string orderOfOption(const std::string& text);
 
 /// Returns the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`.

@@ -314,7 +314,10 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
         fmt::format("{}: {}: expected {} fields, {}, not {} ({})", place(line_), inQuotes(content),
                     count, names(), fields.size(),
                     fields.size() == 12 ? kPosesWithoutTimes
-                                        : "other columns: --event-columns, - for one to ignore"));
+                    : columns_.table.separator == ',' && fields.size() == count + 1
+                        ? "a decimal comma? Then semicolons between the fields; other columns: "
+                          "--event-columns"
+                        : "other columns: --event-columns, - for one to ignore"));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
@@ -333,8 +336,9 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   const std::string_view time = field_of('t');
   std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);
   if (const std::size_t n = columns_.order.find('n'); t_ns && n < fields.size()) {
-    const auto part_ns = nanosecondsIn(time, fields[n]);
-    if (!part_ns) throw fail("nanoseconds", fields[n], "0 to 999999999, after whole seconds");
+    const auto part_ns = nanosecondsIn(time, fields[n], columns_.parts_exponent);
+    if (!part_ns)
+      throw fail("part of a second", fields[n], "less than a second, after whole seconds");
     *t_ns += *part_ns;
   }
   if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {

@@ -43,9 +43,11 @@ std::size_t groupOf(std::string_view word) {
   return position ? kPositions : 0;
 }
 
-/// The field that a column's name means, and the rest of the name, which tells the body.
+/// The field that a column's name means, the word for its group, and the rest of the name, which
+/// tells the body.
 struct PoseName {
   std::size_t field = 0;
+  std::string group;
   std::string body;
   bool certain = true;  ///< False for "cam x", which is a position if "cam qx" is beside it.
 };
@@ -60,12 +62,16 @@ std::optional<PoseName> poseNameOf(const HeaderWord& word) {
   const std::string_view stem = parts.back().substr(0, parts.back().size() - 1);
   parts.pop_back();
   std::size_t group = groupOf(stem);
+  std::string group_word = stem.empty() ? "" : std::string(stem) + "x";  // px is not p_x
   if (axis == std::string_view::npos || (group == 0 && !stem.empty())) return std::nullopt;
   for (std::size_t k = parts.size(); group == 0 && k-- > 0;) {
     group = groupOf(parts[k]);
-    if (group > 0) parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
+    if (group == 0) continue;
+    group_word = parts[k];
+    parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
   }
-  PoseName name{0, fmt::format("{}", fmt::join(parts, " ")), group > 0 || parts.empty()};
+  PoseName name{0, group_word, fmt::format("{}", fmt::join(parts, " ")),
+                group > 0 || parts.empty()};
   if (group == 0) group = kPositions;
   if (group == kPositions && axis == 3) return std::nullopt;
   name.field = group + axis;
@@ -83,6 +89,7 @@ struct PoseColumns {
 struct Body {
   std::array<std::optional<std::size_t>, kEnd> column;
   bool certain = true;  ///< False if only rotations beside them show that these are positions.
+  std::optional<std::size_t> other;  ///< A column of a second position or rotation.
 
   bool has(std::size_t begin, std::size_t end) const { return countIn(begin, end) == end - begin; }
   std::size_t countIn(std::size_t begin, std::size_t end) const {
@@ -93,15 +100,36 @@ struct Body {
 };
 
 /// Returns the bodies in a header, by the rest of their columns' names; the one with most columns
-/// is `most`.
+/// is `most`. Of positions and of rotations with other words (x and px), a complete one counts.
 std::map<std::string, Body> bodiesIn(const std::vector<HeaderWord>& words, Body& most) {
   std::map<std::string, Body> bodies;
+  std::vector<std::pair<PoseName, Body>> groups;  // in the order of the columns
   for (std::size_t k = 0; k < words.size(); ++k) {
     const auto name = poseNameOf(words[k]);
     if (!name || words[k].isTime()) continue;
-    Body& body = bodies[name->body];
-    if (!body.column[name->field]) body.column[name->field] = k;
-    body.certain = body.certain && name->certain;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& other) {
+      return other.first.group == name->group && other.first.body == name->body &&
+             (other.first.field < kRotations) == (name->field < kRotations);
+    });
+    if (group == groups.end()) group = groups.insert(group, {*name, {}});
+    if (!group->second.column[name->field]) group->second.column[name->field] = k;
+    group->second.certain = group->second.certain && name->certain;
+  }
+  for (const bool complete : {true, false}) {
+    for (const auto& [name, group] : groups) {
+      const bool rotation = name.field >= kRotations;
+      const std::size_t begin = rotation ? kRotations : kPositions;
+      const std::size_t end = rotation ? kEnd : kRotations;
+      Body& body = bodies[name.body];
+      if (group.has(begin, end) != complete) continue;
+      if (body.countIn(begin, end) > 0) {
+        if (complete) body.other = group.column[begin];
+        continue;
+      }
+      std::copy(group.column.begin() + begin, group.column.begin() + end,
+                body.column.begin() + begin);
+      body.certain = body.certain && group.certain;
+    }
   }
   for (auto body = bodies.begin(); body != bodies.end();) {
     const bool is_pose = body->second.certain || body->second.has(kRotations, kEnd);
@@ -128,9 +156,10 @@ std::string commandOfBody(const TextTable& table, const Body& body, const TimeCo
                 ? table.length_unit.empty() || column == time.column ? "" : "_" + table.length_unit
                 : "_" + unit);
   };
-  std::string names = time.nanoseconds ? "sec" + separator + "nanosec" : "t" + unit_of(time.column);
+  std::string names = "t" + unit_of(time.column);
+  if (time.parts) names = "sec" + separator + timeUnitOf(time.parts_exponent) + "ec";
   std::string columns = fmt::format("${}", time.column + 1);
-  if (time.nanoseconds) columns += fmt::format(", ${}", *time.nanoseconds + 1);
+  if (time.parts) columns += fmt::format(", ${}", *time.parts + 1);
   for (std::size_t k = kPositions; k < kEnd; ++k) {
     names += separator + kFields[k] + (k < kRotations ? unit_of(*body.column[k]) : "");
     columns += fmt::format(", ${}", *body.column[k] + 1);
@@ -208,6 +237,16 @@ PoseColumns poseColumnsOf(const TextTable& table) {
                                          found.size(), names, inQuotes(found[0].first),
                                          commandOfBody(table, found[0].second, *time)));
   }
+  if (const auto other = found[0].second.other) {
+    throw std::runtime_error(fmt::format(
+        "{}: column {}, {}, is of a second position or rotation of this body: expected one (rename "
+        "the columns to ignore)",
+        header, *other + 1, inQuotes(words[*other].name)));
+  }
+  if (!words[time->column].unit.empty() && !time->exponent) {
+    throw std::runtime_error(fmt::format("the unit {} of t: expected s, ms, us or ns",
+                                         inQuotes(words[time->column].unit)));
+  }
   PoseColumns columns;
   columns.time = *time;
   columns.column[0] = time->column;
@@ -282,10 +321,11 @@ int exponentOf(const PoseText& text, const std::string& file, const ReaderOption
     const std::size_t t = columns.column[0] + 1;
     requireTimesOfPoses(
         sample, file, options,
-        fmt::format("with a file of the frames' times: {}{} 'NR==FNR {{t[FNR{}]=$1; next}} FNR>={} "
-                    "{{${}=t[${}+0]}} 1' TIMES FILE >NEW",
-                    awk, awk.size() > 3 ? fmt::format(" -v OFS={}", awk.substr(6)) : "",
-                    sample.earliest == 0 ? "-1" : "", text.rows.front().line, t, t));
+        fmt::format(
+            "with a file of the frames' times: {}{} 'NR==FNR {{if ($1 ~ /^[0-9]/) t[n++]=$1; "
+            "next}} FNR>={} {{${}=t[${}-{}]}} 1' TIMES FILE >NEW",
+            awk, awk.size() > 3 ? fmt::format(" -v OFS={}", awk.substr(6)) : "",
+            text.rows.front().line, t, t, sample.earliest));
   }
   if (!sample.whole && options.pose_time_unit.empty()) {  // `time_unit` is for whole numbers
     requireSecondsOfPoses(sample, file, options);
@@ -301,15 +341,16 @@ std::vector<std::string_view> fieldsOf(const TextTable& table, std::string_view 
   const bool named = !table.names.empty();
   const std::size_t count = named ? table.names.size() : kEnd;
   std::vector<std::string_view> fields = table.fieldsOf(row);
-  if (fields.size() + 1 == count && row.back() == table.separator) fields.emplace_back();
   if (!named && fields.size() == 12) throw std::runtime_error(kPosesWithoutTimes);
   if (!named && table.separator == ',') {
     throw std::runtime_error("commas without a header: expected a header with the columns' names");
   }
   if (fields.size() == count) return fields;
+  const bool commas = table.separator == ',' && fields.size() >= 2 * count - 1;
   throw std::runtime_error(
       fmt::format("{} fields: expected {}{}", fields.size(), count,
-                  named                   ? ", as in the header"
+                  commas  ? "; decimal commas? Then semicolons or quotes between the fields"
+                  : named ? ", as in the header"
                   : fields.size() == 7    ? ", t tx ty tz qx qy qz qw (angles are not read)"
                   : fields.size() > count ? ", t tx ty tz qx qy qz qw; name them in a header line"
                                           : ", t tx ty tz qx qy qz qw"));
@@ -341,8 +382,8 @@ void findRows(std::string& content, const std::string& file, PoseText& parsed) {
   std::string_view text = table.rows;
   for (std::uint64_t number = table.lines_before + 1; !text.empty(); ++number) {
     const std::string_view line = takeLine(text);
-    const std::string_view row = trimmed(line.substr(0, line.find('#')));
-    if (!row.empty()) parsed.rows.push_back({number, row});
+    const std::string_view row = line.substr(0, line.find('#'));
+    if (!trimmed(row).empty()) parsed.rows.push_back({number, row});
   }
 }
 
@@ -361,21 +402,23 @@ PoseText parsePoses(std::string& content, const std::string& file, const ReaderO
   const auto fields_of = [&](const PoseRow& row) { return fieldsOf(parsed.table, row.text); };
   if (!parsed.rows.empty()) at_row(parsed.rows.front(), fields_of);
   const int exponent = exponentOf(parsed, file, options);
-  bool in_parts = columns.time.nanoseconds.has_value();
+  bool in_parts = columns.time.parts.has_value();
   const auto take = [&](const PoseRow& row) {
     const std::vector<std::string_view> fields = fields_of(row);
     std::array<std::string_view, kEnd> ordered;
     for (std::size_t k = 0; k < kEnd; ++k) ordered[k] = fields[columns.column[k]];
-    if (std::all_of(ordered.begin() + kPositions, ordered.end(), isLost)) return false;
+    const bool lost = std::all_of(ordered.begin() + kPositions, ordered.end(), isLost);
+    if (lost && parseFinite(ordered[0])) return false;
     parsed.poses.push_back(parsePose(ordered, exponent, columns.metres));
     if (!in_parts) return true;
-    const std::string_view part = fields[*columns.time.nanoseconds];
-    const auto ns = nanosecondsIn(ordered[0], part);
+    const std::string_view part = fields[*columns.time.parts];
+    const auto ns = nanosecondsIn(ordered[0], part, columns.time.parts_exponent);
     if (ns) parsed.poses.back().t_ns += *ns;
     in_parts = ns.has_value();
     if (!ns && parsed.poses.size() > 1) {
-      throw std::runtime_error(fmt::format(
-          "nanoseconds = {}: expected 0 to 999999999, after whole seconds", inQuotes(part)));
+      throw std::runtime_error(
+          fmt::format("part of a second = {}: expected less than a second, after whole seconds",
+                      inQuotes(part)));
     }
     return true;
   };

@@ -14,8 +14,20 @@ namespace {
 
 bool isLetterOrDigit(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
 
+/// Splits a line into fields. Fields between tabs, commas and semicolons may be empty.
 std::vector<std::string_view> splitAt(std::string_view line, char separator) {
-  return separator == ' ' ? splitWords(line) : splitFields(line, {&separator, 1});
+  if (separator == ' ') return splitWords(line);
+  std::vector<std::string_view> fields = splitFields(line, {&separator, 1});
+  if (!line.empty() && line.back() == separator) fields.emplace_back();
+  return fields;
+}
+
+/// Returns a line without blanks and CR at its ends, but with tabs, which may separate empty
+/// fields.
+std::string_view withoutBlanks(std::string_view line) {
+  while (!line.empty() && (line.back() == ' ' || line.back() == '\r')) line.remove_suffix(1);
+  while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
+  return line;
 }
 
 /// Parses a number, which may be in quotes, have a decimal comma, or a comma after it.
@@ -31,7 +43,8 @@ bool isNumber(std::string_view field) {
 /// Returns the separator of a line of at least four fields. Commas within numbers between blanks
 /// are decimal commas, also where a comma and a blank separate the numbers.
 char separatorOf(std::string_view line) {
-  if (line.find(';') != line.npos) return ';';
+  if (std::count(line.begin(), line.end(), ';') > std::count(line.begin(), line.end(), '\t'))
+    return ';';
   if (line.find(',') == line.npos) return ' ';
   const std::vector<std::string_view> words = splitWords(line);
   bool decimal = false;
@@ -64,19 +77,18 @@ std::vector<HeaderWord> namesIn(const std::vector<std::string_view>& fields, cha
   return names;
 }
 
-/// Takes units from a line that has nothing else. @return whether it has.
+/// Takes units from a line below the names that has a known one. @return whether it has.
 bool takeUnits(const std::vector<std::string_view>& fields, std::vector<HeaderWord>& names) {
   std::vector<std::string> units;
+  bool any = false;
   for (const std::string_view field : fields) {
     const HeaderWord word = headerWord(field);
-    const std::string& unit = word.unit.empty() ? word.name : word.unit;
-    const bool known = metresOf(unit) || timeExponentOf(unit);
-    if (!known && !word.name.empty() && word.name != "-") return false;
-    units.push_back(known ? unit : "");
+    units.push_back(word.unit.empty() ? word.name : word.unit);
+    any = any || metresOf(units.back()) || timeExponentOf(units.back());
   }
-  if (units.size() != names.size()) return false;
-  for (std::size_t k = 0; k < units.size(); ++k) {
-    if (units[k].empty()) continue;
+  if (!any || units.size() > names.size() + 1) return false;
+  for (std::size_t k = 0; k < std::min(units.size(), names.size()); ++k) {
+    if (units[k].empty() || units[k] == "-") continue;
     names[k].unit = units[k];
     names[k].time_exponent = timeExponentOf(units[k]);
   }
@@ -118,21 +130,29 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
   std::uint64_t number = 0;
   while (!text.empty()) {
     const std::string_view from = text;
-    const std::string_view line = trimmed(takeLine(text));
+    const std::string_view raw = withoutBlanks(takeLine(text));
+    const std::string_view line = trimmed(raw);
     ++number;
     if (line.empty()) continue;
     const bool comment = isComment(line);
     const std::string_view content = comment ? trimmed(line.substr(1)) : line;
+    const std::string_view tabbed = comment ? content : raw;
     const char separator = separatorOf(content);
     const std::vector<std::string_view> fields = splitAt(content, separator);
     const std::size_t count = table.names.size();
-    const bool has_number = std::any_of(fields.begin(), fields.end(), isNumber);
-    if (!comment && (count > 0 ? has_number : isRow(fields))) {
+    bool row = !comment && isRow(fields);
+    if (count > 0) {  // below a header: units, a comment, another header, or a row
+      const std::vector<std::string_view> by_tabs = splitAt(raw, '\t');
+      if (!row && takeUnits(by_tabs.size() == count ? by_tabs : fields, table.names)) continue;
+      if (comment) continue;
+      row = row || !takes(namesIn(fields, separator));
+    }
+    if (row) {
       if (table.rows.empty()) {
         table.rows = from;
         table.lines_before = number - 1;
         table.separator = separator;
-        if (count > 1 && splitAt(line, '\t').size() == count) table.separator = '\t';
+        if (count > 1 && splitAt(raw, '\t').size() == count) table.separator = '\t';
       }
       if (count > 0 || ++rows > kNumbersInHeader ||
           std::all_of(fields.begin(), fields.end(), isNumber)) {
@@ -141,7 +161,6 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
       lines.add(fields);
       continue;
     }
-    if (count > 0 && (takeUnits(fields, table.names) || comment)) continue;
     if (!comment) lines.add(fields);
     const auto key = std::find_if(fields.begin(), fields.end(), [](std::string_view field) {
       return headerWord(field).name == "length units";
@@ -150,8 +169,8 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
       table.length_unit = headerWord(*std::next(key)).name;
     }
     for (std::vector<HeaderWord> names :
-         {comment ? std::vector<HeaderWord>() : lines.names(),
-          namesIn(splitAt(content, '\t'), '\t'), namesIn(fields, separator)}) {
+         {comment ? std::vector<HeaderWord>() : lines.names(), namesIn(splitAt(tabbed, '\t'), '\t'),
+          namesIn(fields, separator)}) {
       if (!takes(names)) continue;
       table.names = std::move(names);
       table.header = line;
@@ -160,6 +179,7 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
       break;
     }
     if (table.names.empty() && table.rows.empty() && fields.size() >= 3 && !comment) {
+      table.other_names = namesIn(fields, separator);
       table.header = line;
       table.header_line = number;
     }
@@ -171,7 +191,14 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
 }
 
 std::vector<std::string_view> TextTable::fieldsOf(std::string_view line) const {
-  return splitAt(trimmed(line.substr(0, line.find('#'))), separator);
+  const std::string_view content = withoutBlanks(line.substr(0, line.find('#')));
+  if (trimmed(content).empty()) return {};
+  std::vector<std::string_view> fields = splitAt(content, separator);
+  // An empty field at the end counts as the header has it.
+  const bool longer = fields.size() == names.size() + 1 || names.empty();
+  if (fields.size() + 1 == names.size() && names.back().name.empty()) fields.emplace_back();
+  if (longer && separator != ' ' && fields.back().empty()) fields.pop_back();
+  return fields;
 }
 
 void TextTable::makePlain(char* begin, char* end) const {
@@ -200,6 +227,7 @@ bool HeaderWord::isTime() const {
                                          "timestamp",  "timestamps", "stamp", "time_stamp",
                                          "time stamp", "event_time"};
   const std::string last = name.substr(name.find_last_of("./") + 1);
+  if (last.size() > 6 && last.compare(last.size() - 6, 6, "_stamp") == 0) return true;
   const std::size_t begin = std::min(last.find_first_not_of('_'), last.size());
   return std::find(std::begin(kNames), std::end(kNames), last.substr(begin)) != std::end(kNames);
 }
@@ -223,23 +251,29 @@ std::optional<TimeColumns> timeColumnsOf(const std::vector<HeaderWord>& names,
     if (!names[k].isTime()) continue;
     const std::string& name = names[k].name;
     const auto common = std::mismatch(name.begin(), name.end(), beside.begin(), beside.end()).first;
-    const std::pair rank(name.find("stamp") != std::string::npos, common - name.begin());
+    const bool of_message = name.find("header") != std::string::npos ||
+                            name.substr(name.find_last_of("./") + 1) == "stamp";
+    const std::pair rank(of_message, common - name.begin());
     if (best && rank <= best_rank) continue;
     best = TimeColumns{k, names[k].time_exponent, {}};
     best_rank = rank;
   }
   for (std::size_t k = 0; best && best->exponent == 0 && k < names.size(); ++k) {
-    if (names[k].name == names[best->column].name && names[k].time_exponent == -9) {
-      best->nanoseconds = k;
-    }
+    if (names[k].name != names[best->column].name || names[k].time_exponent.value_or(0) == 0)
+      continue;
+    best->parts = k;
+    best->parts_exponent = *names[k].time_exponent;
   }
   return best;
 }
 
-std::optional<std::int64_t> nanosecondsIn(std::string_view seconds, std::string_view nanoseconds) {
-  const auto ns = parseNumber<std::int64_t>(nanoseconds);
-  const bool is_part = ns && *ns >= 0 && *ns < kNanosecondsPerSecond;
-  return is_part && parseNumber<std::int64_t>(seconds) ? ns : std::nullopt;
+std::optional<std::int64_t> nanosecondsIn(std::string_view seconds, std::string_view parts,
+                                          int exponent) {
+  const auto count = parseNumber<std::int64_t>(parts);
+  const std::int64_t unit_ns = nanosecondsPer(exponent);
+  const bool is_part = count && *count >= 0 && *count < kNanosecondsPerSecond / unit_ns;
+  if (!is_part || !parseNumber<std::int64_t>(seconds)) return std::nullopt;
+  return *count * unit_ns;
 }
 
 std::optional<double> metresOf(std::string_view unit) {

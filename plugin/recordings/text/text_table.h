@@ -34,7 +34,8 @@ struct TextTable {
   char separator = ' ';
   /// True if the text has quotes, or decimal commas beside another separator: see `makePlain`.
   bool decorated = false;
-  std::vector<HeaderWord> names;   ///< Of the columns; empty: there is no header.
+  std::vector<HeaderWord> names;        ///< Of the columns; empty: there is no header.
+  std::vector<HeaderWord> other_names;  ///< Those in the last line of words that is no header.
   std::string_view header;         ///< The line of the names, else the last line of other words.
   std::uint64_t header_line = 0;   ///< Its number; 0: there is none.
   std::uint64_t lines_before = 0;  ///< Lines before the first row.
@@ -52,14 +53,15 @@ struct TextTable {
 /// Finds the table in a text. Rows have three fields or more, at least half of them numbers. The
 /// header is a line before them, also after `#` or `%`, whose names `takes` accepts; several lines
 /// with one field for each column are taken together ("Position" above "X"), and a line of units
-/// alone may follow. Other lines before the rows are skipped.
+/// may follow. Other lines before the header are skipped.
 TextTable findTable(std::string_view text, bool (*takes)(const std::vector<HeaderWord>&));
 
 /// The columns of the rows' times.
 struct TimeColumns {
   std::size_t column = 0;
-  std::optional<int> exponent;             ///< Of the unit, if the header names it.
-  std::optional<std::size_t> nanoseconds;  ///< Those beside whole seconds: see `nanosecondsIn`.
+  std::optional<int> exponent;       ///< Of the unit, if the header names it.
+  std::optional<std::size_t> parts;  ///< Parts of a second beside whole seconds: `nanosecondsIn`.
+  int parts_exponent = -9;           ///< Of their unit.
 };
 
 /// Finds the times: stamps of messages come before times of their receipt, and the names with the
@@ -68,8 +70,9 @@ std::optional<TimeColumns> timeColumnsOf(const std::vector<HeaderWord>& names,
                                          const std::string& beside);
 
 /// Returns the nanoseconds to add to a time in whole seconds; std::nullopt for seconds with
-/// decimals, or nanoseconds of more than a second: in the first row, both are times of their own.
-std::optional<std::int64_t> nanosecondsIn(std::string_view seconds, std::string_view nanoseconds);
+/// decimals, or parts of more than a second: in the first row, both are times of their own.
+std::optional<std::int64_t> nanosecondsIn(std::string_view seconds, std::string_view parts,
+                                          int exponent);
 
 /// Returns whether a line is a comment.
 inline bool isComment(std::string_view line) {

@@ -307,6 +307,12 @@ TEST_F(CalibrationFile, MayBeOfBasaltOpenVinsOrNerfstudio) {
                                 "0], [0, 0, 0, 1]]}"))
                       .rig;
   EXPECT_NEAR(rig.cameras.at(1).T_rig_cam.translation.x(), 0.1, 1e-12);
+  const std::string metashape =
+      R"({"w": 346, "h": 260, "fl_x": 226, "fl_y": 227, "cx": 173, "cy": 133, "k1": 0.1, "k2": 0.2,
+          "k3": 0.5, "k4": 0, "p1": 0.3, "p2": 0.4, "camera_model": "OPENCV"})";
+  EXPECT_EQ(read(metashape).rig.cameras[0].model, read(kCameraInfo).rig.cameras[0].model);
+  EXPECT_THAT(errorOfText(replaced(metashape, "\"k4\": 0", "\"k4\": 0.1")),
+              HasSubstr("number of distortion coefficients = 6: must be 4 or 5"));
   const std::string transforms =
       R"({"w": 346, "h": 260, "fl_x": 226, "fl_y": 227, "cx": 173, "cy": 133, "k1": 0.1, "k2": 0.2,
           "p1": 0.3, "p2": 0.4, "camera_model": "OPENCV", "frames": []})";
@@ -566,11 +572,19 @@ TEST_F(HandEyeFile, MayBeANumpyArrayOrTextOfTheMatrix) {
 }
 
 TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
-  for (const char* text : {"", "5\n", "T_rig_body: 1\n", "0 0 0 0 0 1\n"}) {
+  for (const char* text : {"", "T_rig_body: 1\n"}) {
     EXPECT_THAT(errorOfText(text),
                 AllOf(HasSubstr("hand_eye.yaml: T_body_rig is missing: expected YAML"),
                       HasSubstr("4 rows of 4 numbers")))
         << text;
+  }
+  EXPECT_THAT(
+      errorOfText("0 0 0 0 0 1\n"),
+      HasSubstr("hand_eye.yaml: 6 numbers: expected 7, a position and a quaternion, or 16"));
+  for (const char* text : {"# x y z qw qx qy qz\n1 2 3 1 0 0 0\n",
+                           "# x[cm] y[cm] z[cm] qx qy qz qw\n1 2 3 0 0 0 1\n"}) {
+    EXPECT_THAT(errorOfText(text),
+                HasSubstr("hand_eye.yaml: expected x y z qx qy qz qw, in metres"));
   }
   EXPECT_THAT(errorOfText("\nT_body_rig: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n"),
               HasSubstr("hand_eye.yaml:2: T_body_rig: 12 numbers: expected 4 rows of 4 numbers"));
@@ -606,6 +620,8 @@ TEST_F(HandEyeFile, MayBeOfVinsOpenVinsOrSevenNumbers) {
         "   data: [0, 0, 1, 0.4, -1, 0, 0, 0.2, 0, -1, 0, -0.1, 0, 0, 0, 1]\n",
         "cam0:\n  T_imu_cam:\n  - [0, 0, 1, 0.4]\n  - [-1, 0, 0, 0.2]\n  - [0, -1, 0, -0.1]\n"
         "  - [0, 0, 0, 1]\n",
+        "extrinsicRotation: {data: [0, 0, 1, -1, 0, 0, 0, -1, 0]}\n"
+        "extrinsicTranslation: {data: [0.4, 0.2, -0.1]}\n",
         "0.4 0.2 -0.1 -0.5 0.5 -0.5 0.5\n",
         "# x y z qx qy qz qw\n0.4,0.2,-0.1,0.5,-0.5,0.5,-0.5\n"}) {
     expectNear(read(text), expected, 1e-12);

@@ -85,13 +85,13 @@ std::string rowOf(const std::string& format, int i, double metre = 1) {
   const Eigen::Vector3d p = metre * pose.T_world_rig.translation;
   const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
   const auto text = [](double value) { return fmt::format("{:.12f}", value); };
-  return fmt::format(format + "\n", fmt::arg("s", fmt::format("{:.9f}", 1e-9 * double(pose.t_ns))),
-                     fmt::arg("ns", pose.t_ns), fmt::arg("whole", pose.t_ns / 1'000'000'000),
-                     fmt::arg("part", pose.t_ns % 1'000'000'000),
-                     fmt::arg("ms", pose.t_ns / 1'000'000), fmt::arg("x", text(p.x())),
-                     fmt::arg("y", text(p.y())), fmt::arg("z", text(p.z())),
-                     fmt::arg("qx", text(q.x())), fmt::arg("qy", text(q.y())),
-                     fmt::arg("qz", text(q.z())), fmt::arg("qw", text(q.w())), fmt::arg("i", i));
+  return fmt::format(
+      format + "\n", fmt::arg("s", fmt::format("{:.9f}", 1e-9 * double(pose.t_ns))),
+      fmt::arg("ns", pose.t_ns), fmt::arg("whole", pose.t_ns / 1'000'000'000),
+      fmt::arg("part", pose.t_ns % 1'000'000'000), fmt::arg("micro", pose.t_ns / 1000 % 1'000'000),
+      fmt::arg("ms", pose.t_ns / 1'000'000), fmt::arg("x", text(p.x())), fmt::arg("y", text(p.y())),
+      fmt::arg("z", text(p.z())), fmt::arg("qx", text(q.x())), fmt::arg("qy", text(q.y())),
+      fmt::arg("qz", text(q.z())), fmt::arg("qw", text(q.w())), fmt::arg("i", i));
 }
 
 std::string tableOf(const std::string& header, const std::string& format, double metre = 1) {
@@ -171,6 +171,28 @@ TEST_F(PoseTable, ReadsTheHeadersOfOtherPrograms) {
                "{ns},{x},{y},{z},{qw},{qx},{qy},{qz},1,2,3,4")},
       {"quotes", tableOf("\"t\",\"name\",\"x\",\"y\",\"z\",\"qx\",\"qy\",\"qz\",\"qw\"\n",
                          "\"{s}\",\"a, b\",\"{x}\",\"{y}\",{z},\"{qx}\",{qy},{qz},{qw}")},
+      {"seconds and microseconds",
+       tableOf("sec,usec,x,y,z,qx,qy,qz,qw\n", "{whole},{micro},{x},{y},{z},{qx},{qy},{qz},{qw}")},
+      {"units with empty cells, and a text column",
+       tableOf("time,x,y,z,qx,qy,qz,qw,name\nms,mm,mm,mm,,,,\n",
+               "{ms},{x},{y},{z},{qx},{qy},{qz},{qw},a", 1000)},
+      {"Euler angles before the quaternion",
+       tableOf("time,x,y,z,rot_x,rot_y,rot_z,qx,qy,qz,qw\n",
+               "{s},{x},{y},{z},0.01,0.02,0.03,{qx},{qy},{qz},{qw}")},
+      {"pixels before the position",
+       tableOf("time,px,py,p_x,p_y,p_z,qx,qy,qz,qw\n", "{s},9,9,{x},{y},{z},{qx},{qy},{qz},{qw}")},
+      {"a time of receipt before the stamp",
+       tableOf("timestamp,header.stamp.sec,header.stamp.nanosec,pose.position.x,pose.position.y,"
+               "pose.position.z,pose.orientation.x,pose.orientation.y,pose.orientation.z,"
+               "pose.orientation.w\n",
+               "9,{whole},{part},{x},{y},{z},{qx},{qy},{qz},{qw}")},
+      {"a column without a name at the end",
+       tableOf(",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Error\n"
+               "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,\n",
+               "{i},{s},{qx},{qy},{qz},{qw},{x},{y},{z},")},
+      {"empty fields between tabs, and semicolons in a text",
+       tableOf("\tt\tx\ty\tz\tqx\tqy\tqz\tqw\tfile\tflag\n",
+               "\t{s}\t{x}\t{y}\t{z}\t{qx}\t{qy}\t{qz}\t{qw}\ta;b\t")},
       {"two times, in seconds and in nanoseconds",
        tableOf("time_s,time_ns,x,y,z,qx,qy,qz,qw\n", "{s},{ns},{x},{y},{z},{qx},{qy},{qz},{qw}")},
   };
@@ -188,6 +210,15 @@ TEST_F(PoseTable, ReadsTheHeadersOfOtherPrograms) {
       {"t,tx,ty,tz_mm,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n",
        "poses.txt:1: the units of tx, ty and tz are '', '' and 'mm': expected one at each"},
       {"# t tx ty tz [mm] qx qy qz qw\n1.5 1 2 3 0 0 0 1\n", "are '', '' and 'mm'"},
+      {"time [min],x,y,z,qx,qy,qz,qw\n1.5,2,3,4,0,0,0,1\n",
+       "the unit 'min' of t: expected s, ms, us"},
+      {"t,x,y,z,qx,qy,qz,qw\ns,in,in,mm,,,,\n1,2,3,4,0,0,0,1\n", "the unit 'in' of tx: expected m"},
+      {"t,x,y,z,qx,qy,qz,qw\nnone of these is a unit,,,,,,,\n1,2,3,4,0,0,0,1\n",
+       "poses.txt:2: t = 'none of these is a unit': expected a decimal time"},
+      {"t,x,y,z,pos_x,pos_y,pos_z,qx,qy,qz,qw\n1,2,3,4,2,3,4,0,0,0,1\n",
+       "column 5, 'pos_x', is of a second position or rotation of this body: expected one"},
+      {"t,x,y,z,qx,qy,qz,qw\n1,5,2,0,3,0,4,0,0,0,0,0,0,0,1,0\n",
+       "16 fields: expected 8; decimal commas? Then semicolons or quotes between the fields"},
       {"t,x [mm],y [m],z [ft],qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n", "the unit 'ft' of tz: expected m,"},
   };
   for (const auto& [text, error] : errors) EXPECT_THAT(errorOfText(text), HasSubstr(error)) << text;
@@ -293,10 +324,28 @@ TEST_F(PoseTable, EventsHaveSecondsAndNanosecondsToo) {
   for (int i = 0; i < 30; ++i) {
     EXPECT_EQ(events[static_cast<std::size_t>(i)].t_ns, 5'000'000'000 + 50'000'000LL * i) << i;
   }
+  const std::pair<std::string, const char*> tables[] = {
+      // 1.5 s, twice
+      {"t,x,y,p\nms,px,px,\n1500,1,2,1\n1500,1,2,1\n", ""},
+      {"sec usec x y p\n1 500000 1 2 1\n1 500000 1 2 1\n", ""},
+      {"1 500000000 1 2 1\n1 500000000 1 2 1\n", "t n x y p"},
+      {"\tt_ms\tx\ty\tp\tflag\n\t1500\t1\t2\t1\t\na;b\t1500\t1\t2\t1\t\n", ""}};
+  for (const auto& [table, columns] : tables) {
+    writeFile(folder() / "table.csv", table);
+    EventTextStream read(folder() / "table.csv", ReaderOptions{{}, columns, {}});
+    EXPECT_EQ(readStream(read), (std::vector<Event>(2, {1'500'000'000, 1, 2, true}))) << table;
+  }
+  const std::pair<std::string, const char*> errors[] = {
+      {"t [min],x,y,p\n1.5,1,2,1\n", "events.csv:1: the unit 'min' of t: expected s, ms, us or ns"},
+      {"t_ms,x,y,type\n1.5,1,2,1\n", "events.csv:1: 't_ms,x,y,type': there is no one column p"}};
+  for (const auto& [table, error] : errors) {
+    writeFile(folder() / "events.csv", table);
+    EXPECT_THAT(errorOf([&] { EventTextStream(folder() / "events.csv"); }), HasSubstr(error));
+  }
   writeFile(folder() / "events.csv", text + "7,1000000000,1,2,1,left\n");
   EventTextStream wrong(folder() / "events.csv");
   EXPECT_THAT(errorOf([&] { readStream(wrong); }),
-              HasSubstr("events.csv:32: nanoseconds = '100000"));
+              HasSubstr("events.csv:32: part of a second = '100000"));
 }
 
 /// Damages a text by one change of a byte after `from`, and reads it. It must be read or rejected
