@@ -82,6 +82,7 @@ std::optional<PoseName> poseNameOf(const HeaderWord& word) {
 struct PoseColumns {
   std::array<std::size_t, kEnd> column = {0, 1, 2, 3, 4, 5, 6, 7};
   TimeColumns time;
+  std::optional<std::size_t> body;                   // the column with the name of the row's body
   Eigen::Vector3d metres = Eigen::Vector3d::Ones();  // in one unit of tx, ty and tz
 };
 
@@ -251,6 +252,12 @@ PoseColumns poseColumnsOf(const TextTable& table) {
   columns.time = *time;
   columns.column[0] = time->column;
   for (std::size_t k = kPositions; k < kEnd; ++k) columns.column[k] = *found[0].second.column[k];
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    const std::string last = " " + words[k].name.substr(words[k].name.find_last_of("./") + 1) + " ";
+    constexpr std::string_view kBodies =
+        " child_frame_id child_frame body body_id body_name rigid_body serial object object_id ";
+    if (kBodies.find(last) != std::string_view::npos) columns.body = k;
+  }
   takeUnits(table, columns);
   return columns;
 }
@@ -403,8 +410,20 @@ PoseText parsePoses(std::string& content, const std::string& file, const ReaderO
   if (!parsed.rows.empty()) at_row(parsed.rows.front(), fields_of);
   const int exponent = exponentOf(parsed, file, options);
   bool in_parts = columns.time.parts.has_value();
+  const auto body_of = [&](const auto& fields) {
+    return columns.body ? trimmed(fields[*columns.body]) : std::string_view();
+  };
+  std::optional<std::string_view> body;
   const auto take = [&](const PoseRow& row) {
     const std::vector<std::string_view> fields = fields_of(row);
+    if (!body) body = body_of(fields);
+    if (body_of(fields) != *body) {
+      throw std::runtime_error(fmt::format(
+          "{} = {}, after {}: poses of several bodies: expected one ({} 'NR <= {} || index(${}, "
+          "\"{}\")' FILE >NEW)",
+          parsed.table.names[*columns.body].name, inQuotes(body_of(fields)), inQuotes(*body),
+          parsed.table.awk(), parsed.table.lines_before, *columns.body + 1, printable(*body)));
+    }
     std::array<std::string_view, kEnd> ordered;
     for (std::size_t k = 0; k < kEnd; ++k) ordered[k] = fields[columns.column[k]];
     const bool lost = std::all_of(ordered.begin() + kPositions, ordered.end(), isLost);

@@ -119,11 +119,19 @@ struct HeaderLines {
   }
 };
 
+/// Takes the unit of lengths from a line of keys and values, as Motive has one.
+void takeLengthUnit(const std::vector<std::string_view>& fields, TextTable& table) {
+  for (std::size_t k = 0; k + 1 < fields.size(); ++k) {
+    if (headerWord(fields[k]).name == "length units") {
+      table.length_unit = headerWord(fields[k + 1]).name;
+    }
+  }
+}
+
 }  // namespace
 
 TextTable findTable(std::string_view text, bool (*takes)(const std::vector<HeaderWord>&)) {
-  constexpr int kNumbersInHeader =
-      8;  // rows with words, before a header: numbers of a mocap's markers
+  constexpr int kMostRows = 8;  // that have words and are part of a header: numbers of markers
   TextTable table;
   HeaderLines lines;
   int rows = 0;
@@ -154,35 +162,28 @@ TextTable findTable(std::string_view text, bool (*takes)(const std::vector<Heade
         table.separator = separator;
         if (count > 1 && splitAt(raw, '\t').size() == count) table.separator = '\t';
       }
-      if (count > 0 || ++rows > kNumbersInHeader ||
-          std::all_of(fields.begin(), fields.end(), isNumber)) {
+      if (count > 0 || ++rows > kMostRows || std::all_of(fields.begin(), fields.end(), isNumber)) {
         break;
       }
       lines.add(fields);
       continue;
     }
     if (!comment) lines.add(fields);
-    const auto key = std::find_if(fields.begin(), fields.end(), [](std::string_view field) {
-      return headerWord(field).name == "length units";
-    });
-    if (key != fields.end() && std::next(key) != fields.end()) {
-      table.length_unit = headerWord(*std::next(key)).name;
+    takeLengthUnit(fields, table);
+    std::vector<HeaderWord> names = namesIn(fields, separator);
+    const bool other = table.names.empty() && table.rows.empty() && fields.size() >= 3 && !comment;
+    if (other) table.other_names = names;
+    for (std::vector<HeaderWord> better :
+         {namesIn(splitAt(tabbed, '\t'), '\t'), comment ? names : lines.names()}) {
+      if (takes(better)) names = std::move(better);
     }
-    for (std::vector<HeaderWord> names :
-         {comment ? std::vector<HeaderWord>() : lines.names(), namesIn(splitAt(tabbed, '\t'), '\t'),
-          namesIn(fields, separator)}) {
-      if (!takes(names)) continue;
-      table.names = std::move(names);
-      table.header = line;
-      table.header_line = number;
-      table.rows = {};
-      break;
-    }
-    if (table.names.empty() && table.rows.empty() && fields.size() >= 3 && !comment) {
-      table.other_names = namesIn(fields, separator);
-      table.header = line;
-      table.header_line = number;
-    }
+    const bool is_header = takes(names);
+    if (!is_header && !other) continue;
+    table.header = line;
+    table.header_line = number;
+    if (!is_header) continue;
+    table.names = std::move(names);
+    table.rows = {};
   }
   if (table.rows.empty()) table.lines_before = table.names.empty() ? 0 : table.header_line;
   table.decorated = table.rows.find('"') != table.rows.npos ||

@@ -260,6 +260,22 @@ TEST_F(PoseTable, TakesOneOfSeveralBodiesByTheCommandInItsError) {
   }
 }
 
+TEST_F(PoseTable, RowsNameOneBody) {
+  std::string text = "time,frame_id,child_frame_id,x,y,z,qx,qy,qz,qw\n";
+  for (int i = 0; i < 20; ++i) {
+    text += rowOf("{s},odom,base,{x},{y},{z},{qx},{qy},{qz},{qw}", i) +
+            rowOf("{s},map,odom,0,0,0,0,0,0,1", i);
+  }
+  std::string command = errorOfText(text);
+  EXPECT_THAT(command,
+              HasSubstr("poses.txt:3: child_frame_id = 'odom', after 'base': poses of several"));
+  command.erase(0, command.find("awk"));
+  command.replace(command.find("FILE"), 4, (folder() / "poses.txt").string());
+  command.replace(command.find("NEW)"), 4, (folder() / "one.csv").string());
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  expectAll(readPoses(folder() / "one.csv"), command);
+}
+
 TEST_F(PoseTable, LeavesOutPosesThatATrackerLostAndSaysSo) {
   std::string text = tableOf("t,x,y,z,qx,qy,qz,qw\n", "{s},{x},{y},{z},{qx},{qy},{qz},{qw}");
   text.insert(text.find('\n') + 1, "1.1,,,,,,,\n");
