@@ -68,6 +68,13 @@ constexpr CameraForm kBasalt = {"intrinsics: fx fy cx cy", false, nullptr, "came
 constexpr CameraForm kDv = {
     "focalLength principalPoint", false, "resolution", "distortionModel", nullptr,
     "distortionCoefficients"};
+/// camera_calibration of ROS, and OpenCV, whose files do not name the model.
+constexpr CameraForm kOpenCv = {"camera_matrix",
+                                true,
+                                "image_width image_height",
+                                "distortion_model camera_model fisheye_model use_fisheye_model",
+                                "plumb_bob",
+                                "distortion_coefficients"};
 /// transforms.json of nerfstudio.
 constexpr CameraForm kNerfFisheye = {"fl_x fl_y cx cy", false,   "w h",
                                      "camera_model",    nullptr, "k1 k2 k3 k4"};
@@ -80,11 +87,7 @@ constexpr CameraForm kMrpt = {"fx fy cx cy", false, "resolution", "distortion_mo
 constexpr std::pair<const char*, CameraForm> kOneCamera[] = {
     // Metavision
     {"img_size", {"K", true, "img_size", "type", nullptr, "D"}},
-    // camera_calibration of ROS, and OpenCV, whose files do not name the model
-    {"camera_matrix",
-     {"camera_matrix", true, "image_width image_height",
-      "distortion_model camera_model fisheye_model use_fisheye_model", "plumb_bob",
-      "distortion_coefficients"}},
+    {"camera_matrix", kOpenCv},
     // The arrays of OpenCV's tutorial, see `readCalibration`
     {"mtx", {"mtx", true, nullptr, "distortion_model", "plumb_bob", "dist"}},
     // Messages of CameraInfo as text, of ROS 1 and 2
@@ -206,7 +209,11 @@ CameraModel readCamera(const YamlEntry& entry, const CameraForm& form,
       area = {area.binning_x,         area.binning_y,      value(roi, "x_offset"),
               value(roi, "y_offset"), value(roi, "width"), value(roi, "height")};
     }
-    model = cutTo(area, model);
+    try {
+      model = cutTo(area, model);
+    } catch (const std::runtime_error& error) {
+      throw entry.fail(error.what());
+    }
   }
   try {
     CameraModel whole = model;
@@ -321,7 +328,7 @@ std::optional<CameraModel> readOneCamera(const YamlEntry& root) {
     if (hasPlace(root, found)) return readCamera(root, form);
   }
   return root.onlyPart("camera_matrix")
-             ? std::optional(readCamera(*root.onlyPart("camera_matrix"), kOneCamera[1].second))
+             ? std::optional(readCamera(*root.onlyPart("camera_matrix"), kOpenCv))
              : std::nullopt;
 }
 

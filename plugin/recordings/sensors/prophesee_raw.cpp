@@ -79,8 +79,9 @@ class RawHeaderParser {
       if (key == "geometry") takeGeometry(value);
       if (key == "endianness") takeOrder(value);
       if (key == "Data") encoding_ = EvtEncoding::kDat;
-      if (key == "Width" || key == "Height") takeSide(key, value);
-      if (key == "Version" && value != "2") throw fail(key, value, "2, of a DAT file");
+      const bool dat = encoding_ == EvtEncoding::kDat;
+      if (dat && (key == "Width" || key == "Height")) takeSide(key, value);
+      if (dat && key == "Version" && value != "2") throw fail(key, value, "2, of a DAT file");
       if (!camera_size_) camera_size_ = sizeOfCamera(key, value);
     }
     if (!header_.size && size_.width > 0 && size_.height > 0) header_.size = size_;

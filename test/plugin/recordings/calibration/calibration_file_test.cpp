@@ -274,8 +274,9 @@ TEST_F(CalibrationFile, LensAndAreaTravelWithTheFile) {
   const Eigen::Vector3d p_cam(0.3, -0.2, 1.5);
   EXPECT_LT((plain.project(p_cam) - (2 * cut.project(p_cam) + Eigen::Vector2d(20.5, 10.5))).norm(),
             1e-9);
-  EXPECT_THAT(errorOfText(replaced(info, "x_offset: 20", "x_offset: 50")),
-              HasSubstr("roi, binning: 300 pixels from 50 on, 2 in one: expected an area in"));
+  EXPECT_THAT(
+      errorOfText(replaced(info, "x_offset: 20", "x_offset: 50")),
+      HasSubstr("given.txt:1: roi, binning: 300 pixels from 50 on, 2 in one: expected an area in"));
   info = replaced(replaced(info, "binning_x: 2", "binning_x: 0"), "binning_y: 2", "binning_y: 0");
   info = replaced(info, "{x_offset: 20, y_offset: 10, height: 200, width: 300, do_rectify: false}",
                   "{x_offset: 0, y_offset: 0, height: 0, width: 0}");

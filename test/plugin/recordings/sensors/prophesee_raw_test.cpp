@@ -81,7 +81,8 @@ TEST_F(PropheseeRaw, WithoutGeometryTheSizeIsThatOfTheCamera) {
            {"% system_ID 210\n", 0, 0},
            {"% plugin_name hal_plugin_gen5_evk4\n% system_ID 99\n", 0, 0},
            {"% plugin_name hal_plugin_gen42\n% serial_number 21\n", 0, 0},
-           {"% system_ID 48\n% geometry 320x240\n% plugin_name hal_plugin_gen3_fx3\n", 320, 240}}) {
+           {"% system_ID 48\n% Version 7\n% geometry 320x240\n% plugin_name hal_plugin_gen3_fx3\n",
+            320, 240}}) {
     writeFile(file(), "% Date 2020-09-25 07:48:31\n" + each.lines + "% evt 2.0\n");
     const std::optional<CameraSize> size = streamOf(file())->size();
     EXPECT_EQ(size.has_value(), each.width > 0) << each.lines;
