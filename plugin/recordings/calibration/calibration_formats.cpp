@@ -327,9 +327,8 @@ std::optional<CameraModel> readOneCamera(const YamlEntry& root) {
   for (const auto& [found, form] : kOneCamera) {
     if (hasPlace(root, found)) return readCamera(root, form);
   }
-  return root.onlyPart("camera_matrix")
-             ? std::optional(readCamera(*root.onlyPart("camera_matrix"), kOpenCv))
-             : std::nullopt;
+  const auto part = root.onlyPart("camera_matrix");
+  return part ? std::optional(readCamera(*part, kOpenCv)) : std::nullopt;
 }
 
 Rig readDvCameras(const YamlEntry& root) {

@@ -338,7 +338,8 @@ int exponentOf(const PoseText& text, const std::string& file, const ReaderOption
     requireSecondsOfPoses(sample, file, options);
     return 0;
   }
-  const bool tum_vie = file.find("mocap_data") != std::string::npos;
+  const std::string name = std::filesystem::path(file).filename().string();
+  const bool tum_vie = name.find("mocap_data") != std::string::npos;
   if (!text.table.names.empty() && tum_vie) return -6;
   return poseTimeExponent(options, sample, file);
 }
@@ -416,6 +417,10 @@ PoseText parsePoses(std::string& content, const std::string& file, const ReaderO
   std::optional<std::string_view> body;
   const auto take = [&](const PoseRow& row) {
     const std::vector<std::string_view> fields = fields_of(row);
+    std::array<std::string_view, kEnd> ordered;
+    for (std::size_t k = 0; k < kEnd; ++k) ordered[k] = fields[columns.column[k]];
+    const bool lost = std::all_of(ordered.begin() + kPositions, ordered.end(), isLost);
+    if (lost && parseFinite(ordered[0])) return false;
     if (!body) body = body_of(fields);
     if (body_of(fields) != *body) {
       throw std::runtime_error(fmt::format(
@@ -424,10 +429,6 @@ PoseText parsePoses(std::string& content, const std::string& file, const ReaderO
           parsed.table.names[*columns.body].name, inQuotes(body_of(fields)), inQuotes(*body),
           parsed.table.awk(), parsed.table.lines_before, *columns.body + 1, printable(*body)));
     }
-    std::array<std::string_view, kEnd> ordered;
-    for (std::size_t k = 0; k < kEnd; ++k) ordered[k] = fields[columns.column[k]];
-    const bool lost = std::all_of(ordered.begin() + kPositions, ordered.end(), isLost);
-    if (lost && parseFinite(ordered[0])) return false;
     parsed.poses.push_back(parsePose(ordered, exponent, columns.metres));
     if (!in_parts) return true;
     const std::string_view part = fields[*columns.time.parts];

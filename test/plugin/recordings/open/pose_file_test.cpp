@@ -104,6 +104,10 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
   options.pose_time_unit = "ms";  // of the poses alone
   EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000'000);
   options.pose_time_unit.clear();
+  std::filesystem::create_directory(folder() /
+                                    "mocap_data");  // TUM-VIE's file is known by its own name
+  EXPECT_THAT(errorOfFile("mocap_data/poses.txt", "t tx ty tz qx qy qz qw\n" + lines),
+              HasSubstr("all times are whole"));
   // Nanoseconds with decimals, and numbers of more columns than a pose has.
   lines.clear();
   for (int i = 0; i < 12; ++i) lines += std::to_string(1'200 + i) + "000000.0 1 2 3 0 0 0 1\n";

@@ -266,6 +266,10 @@ TEST_F(PoseTable, RowsNameOneBody) {
     text += rowOf("{s},odom,base,{x},{y},{z},{qx},{qy},{qz},{qw}", i) +
             rowOf("{s},map,odom,0,0,0,0,0,0,1", i);
   }
+  // A row without a pose has no body.
+  expectAll(read(tableOf("time,child_frame_id,x,y,z,qx,qy,qz,qw\n1.0,,,,,,,,\n",
+                         "{s},base,{x},{y},{z},{qx},{qy},{qz},{qw}")),
+            "an empty row");
   std::string command = errorOfText(text);
   EXPECT_THAT(command,
               HasSubstr("poses.txt:3: child_frame_id = 'odom', after 'base': poses of several"));
