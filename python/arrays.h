@@ -9,7 +9,10 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <fmt/format.h>
+
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -19,6 +22,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "plugin/recordings/text/event_columns.h"
 
 namespace efm {
 
@@ -116,7 +121,8 @@ inline py::array pointsOf(const MapCloud& cloud) {
   PointRecord* next = records.mutable_data();
   for (const MapPoint& point : cloud.points) {
     const Eigen::Vector3d p_world = positionIn(cloud, point);
-    *next++ = {p_world.x(), p_world.y(), p_world.z(), point.intensity, point.support, point.sigma, point.probability};
+    *next++ = {p_world.x(),   p_world.y(), p_world.z(),      point.intensity,
+               point.support, point.sigma, point.probability};
   }
   records.attr("flags").attr("writeable") = false;
   return records;
@@ -186,6 +192,59 @@ inline void checkSignals() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
+/// An event as Metavision's arrays have it.
+struct EventRecord {
+  std::uint16_t x, y;
+  std::int16_t p;
+  std::int64_t t;
+};
+
+using EventArray = py::array_t<EventRecord, py::array::c_style>;
+
+inline std::vector<Event> eventsOf(const EventArray& records) {
+  const EventRecord* first = records.data();
+  std::vector<Event> events(static_cast<std::size_t>(records.size()));
+  const Released released;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    if (first[i].p < -1 || first[i].p > 1) {
+      throw std::invalid_argument(
+          fmt::format("p[{}] = {}: expected {}", i, first[i].p, kExpectedPolarity));
+    }
+    events[i] = {first[i].t, first[i].x, first[i].y, first[i].p > 0};
+  }
+  return events;
+}
+
+inline EventArray recordsOf(const std::vector<Event>& events) {
+  EventArray records(static_cast<py::ssize_t>(events.size()));
+  EventRecord* next = records.mutable_data();
+  const Released released;
+  for (const Event& event : events) {
+    *next++ = {event.x, event.y, static_cast<std::int16_t>(event.polarity ? 1 : 0), event.t_ns};
+  }
+  return records;
+}
+
+using OnProgress = std::function<void(const std::string& activity, double fraction)>;
+
+/// Gives the progress to Python ten times a second.
+class ProgressCalls {
+ public:
+  explicit ProgressCalls(OnProgress on_progress) : on_progress_(std::move(on_progress)) {}
+
+  void operator()(const char* activity, double fraction) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!on_progress_ || now < next_) return;
+    next_ = now + std::chrono::milliseconds(100);
+    const py::gil_scoped_acquire held;
+    on_progress_(activity, fraction);
+  }
+
+ private:
+  OnProgress on_progress_;
+  std::chrono::steady_clock::time_point next_{};
+};
+
 /// Writes a map as the name of the file says.
 inline void savePoints(const MapSnapshot& map, const std::filesystem::path& file) {
   const auto type = file.extension();
@@ -203,7 +262,9 @@ inline void give(const Keyframe& keyframe, const OnKeyframe& on_keyframe) {
   on_keyframe(std::make_shared<const Keyframe>(keyframe));
 }
 
-/// Defines the functions that map, evaluate and simulate.
+/// Defines the functions that map and evaluate recordings.
 void defineJobs(py::module_& module);
+/// Defines simulations, and functions on arrays.
+void defineExperiments(py::module_& module);
 
 }  // namespace efm

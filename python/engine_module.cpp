@@ -23,44 +23,10 @@
 #include "arrays.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/text/event_columns.h"
 #include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {
-
-/// An event as Metavision's arrays have it.
-struct EventRecord {
-  std::uint16_t x, y;
-  std::int16_t p;
-  std::int64_t t;
-};
-
-using EventArray = py::array_t<EventRecord, py::array::c_style>;
-
-std::vector<Event> eventsOf(const EventArray& records) {
-  const EventRecord* first = records.data();
-  std::vector<Event> events(static_cast<std::size_t>(records.size()));
-  const Released released;
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    if (first[i].p < -1 || first[i].p > 1) {
-      throw std::invalid_argument(
-          fmt::format("p[{}] = {}: expected {}", i, first[i].p, kExpectedPolarity));
-    }
-    events[i] = {first[i].t, first[i].x, first[i].y, first[i].p > 0};
-  }
-  return events;
-}
-
-EventArray recordsOf(const std::vector<Event>& events) {
-  EventArray records(static_cast<py::ssize_t>(events.size()));
-  EventRecord* next = records.mutable_data();
-  const Released released;
-  for (const Event& event : events) {
-    *next++ = {event.x, event.y, static_cast<std::int16_t>(event.polarity ? 1 : 0), event.t_ns};
-  }
-  return records;
-}
 
 /// Opens a recording to read it: poses and calibration may be missing.
 std::unique_ptr<Recording> openToRead(RecordingSource source) {
@@ -483,6 +449,7 @@ PYBIND11_MODULE(_engine, module) {
   defineRecordings(module);
   defineMapper(module);
   defineJobs(module);
+  defineExperiments(module);
   // At Python's exit, after the mappers are stopped.
   module.def("wait_for_calls", [] {
     ReleasedCalls::ending() = true;

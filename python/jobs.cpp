@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "arrays.h"
-#include "mapping/base/atomic_file.h"
 #include "mapping/depth/aggregated_extraction.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
@@ -19,33 +18,11 @@
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/recording_info.h"
 #include "plugin/session/host_text.h"
-#include "tracking_stub/presets/presets.h"
-#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 namespace {
 
 using StopFlag = std::atomic<bool>;
-using OnProgress = std::function<void(const std::string& activity, double fraction)>;
-
-/// Gives the progress to Python ten times a second.
-class ProgressCalls {
- public:
-  explicit ProgressCalls(OnProgress on_progress) : on_progress_(std::move(on_progress)) {}
-
-  void operator()(const char* activity, double fraction) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!on_progress_ || now < next_) return;
-    next_ = now + std::chrono::milliseconds(100);
-    const py::gil_scoped_acquire held;
-    on_progress_(activity, fraction);
-  }
-
- private:
-  OnProgress on_progress_;
-  std::chrono::steady_clock::time_point next_{};
-};
-
 MapJob jobOf(const RecordingSource& source, const Options& options, const OnKeyframe& on_keyframe,
              const OnProgress& on_progress) {
   MapJob job = MapJob::of(source, options);
@@ -176,32 +153,22 @@ std::string infoOf(const RecordingSource& source) {
   return infoJson(info);
 }
 
-void simulateInto(const std::filesystem::path& out, const std::string& preset, std::uint64_t seed,
-                  std::optional<double> duration_s, const OnProgress& on_progress) {
-  const Simulation simulation = makeSimulation({preset, duration_s, seed});
-  NewFolder folder(out);  // reports errors before the simulation runs
-  SimulationRun run;
-  run.progress = [progress = ProgressCalls(on_progress)](double fraction) mutable {
-    checkSignals();
-    progress("simulating", fraction);
-  };
-  writeDataset(folder.temporary(), simulation, simulateEvents(simulation, run), checkSignals);
-  folder.finish();
-}
-
 using Path = std::filesystem::path;
 
 std::string depthErrorJson(const Path& estimate, const Path& truth, int tolerance_px,
                            std::optional<double> max_depth_m, std::optional<double> png_scale,
-                           const Path& mask, const std::vector<double>& thresholds_m) {
+                           const Path& mask, const std::vector<double>& thresholds_m,
+                           std::optional<double> focal_baseline) {
   DepthEvaluationOptions options;
   options.pairing.tolerance_px = tolerance_px;
   if (max_depth_m) options.pairing.max_depth_m = *max_depth_m;
   options.png_scale = png_scale;
   options.mask = mask;
   if (!thresholds_m.empty()) options.thresholds_m = thresholds_m;
-  const auto stereo = findStereoBaseline(estimate, truth);
-  if (stereo) options.focal_baseline = stereo->focal_px * stereo->baseline_m;
+  std::optional<StereoBaseline> stereo;
+  if (!focal_baseline) stereo = findStereoBaseline(estimate, truth);
+  if (stereo) focal_baseline = stereo->focal_px * stereo->baseline_m;
+  options.focal_baseline = focal_baseline;
   return evaluationJson(evaluateDepth(estimate, truth, options), stereo);
 }
 
@@ -266,8 +233,6 @@ void defineJobs(py::module_& module) {
                           "sigma", probability, "probability", inputs, "inputs");
   module.def("run_candidates", &mapCandidates);
   module.def("read_info", &infoOf, releases);
-  module.def("simulate", &simulateInto, releases);
-  module.def("simulation_presets", &simulationPresets);
   module.def("true_depth", &trueDepth);
   module.def("write_poses", &writePoses);
   module.def("depth_errors", &depthErrorJson, releases);

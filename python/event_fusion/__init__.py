@@ -18,8 +18,9 @@ except ImportError as error:
 from . import _engine, evaluate
 from ._engine import EVENT_DTYPE, Camera, Keyframe, simulation_presets
 from ._events import EventFusionWarning, events
-from ._mapping import Candidates, Dsi, Map, Mapper, candidates, dsi, map
-from ._recording import Recording, open, simulate
+from ._mapping import Candidates, Dsi, Map, Mapper, candidates, dsi, keyframes, map
+from ._recording import Recording, open, read_cameras, read_poses, write_cameras, write_poses
+from ._simulation import Simulation, perturb, simulate
 
 __version__ = _engine.VERSION
 
@@ -33,12 +34,19 @@ __all__ = [
     "Map",
     "Mapper",
     "Recording",
+    "Simulation",
     "candidates",
     "dsi",
     "evaluate",
     "events",
+    "keyframes",
     "map",
     "open",
+    "perturb",
+    "read_cameras",
+    "read_poses",
     "simulate",
     "simulation_presets",
+    "write_cameras",
+    "write_poses",
 ]

@@ -12,7 +12,7 @@ import threading
 import warnings as python_warnings
 import weakref
 from functools import cached_property
-from typing import Any, Callable, Iterator, NamedTuple
+from typing import Any, Callable, Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -547,6 +547,43 @@ def dsi(
     made = Dsi((values, depths))
     made.keyframe, made.contrast = keyframe, contrast
     return made
+
+
+def keyframes(
+    cameras: Sequence[Camera],
+    events: Sequence[npt.ArrayLike],
+    poses: tuple[npt.ArrayLike, npt.ArrayLike],
+    windows: Iterable[Sequence[int]],
+    options: Options,
+) -> list[Keyframe]:
+    """Map windows of arrays, each alone: the method of the paper, for experiments.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        The rig. ``rig.cameras`` of the options selects those that are mapped.
+    events : sequence of structured array
+        The events of each camera, in the order of time: see `Mapper.add_events`.
+    poses : (times, T_world_rig)
+        Nanoseconds (n,) and matrices (n, 4, 4).
+    windows : iterable of (t0, t1) or (t0, t1, t_ref)
+        Events of [t0, t1), and the time of the view, by default the middle. Windows may overlap.
+    options : mapping or path
+        See `map`. Windows alone do not tell the depths: ``dsi.min_depth_m`` and ``dsi.max_depth_m`` are required.
+        ``depth.max_confidence`` = sequence: that of all windows.
+
+    Raises
+    ------
+    ValueError
+        If an option is out of range or missing, events are not in the order of time, or a view has no pose.
+
+    Notes
+    -----
+    Ghosh and Gallego 2022, Algorithms 1 and 2. No filter of events, map or refinement: see `map` for these.
+    """
+    arrays = _engine.RigArrays(list(cameras), [event_records(of_camera) for of_camera in events], *poses)
+    times = [tuple(window) if len(window) == 3 else (*window, (window[0] + window[1]) // 2) for window in windows]
+    return _engine.keyframes(arrays, times, engine_options(options))
 
 
 class Candidates(NamedTuple):

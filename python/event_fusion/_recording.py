@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings, read and simulated."""
+"""Recordings, and poses and calibrations in files."""
 
 from __future__ import annotations
 
+import builtins
 import json
 import os
-import pathlib
 import tempfile
 from functools import cached_property
 from typing import Any, Iterator, Sequence
 
+import numpy as np
+import numpy.typing as npt
+
 from . import _engine
 from ._engine import Camera
-from ._events import Array, Path, Progress, ProgressBar, in_unit, times_in, ns_per, whole
+from ._events import Array, Path, in_unit, ns_per, times_in, times_in_ns, whole
 
 
 class Recording:
@@ -29,6 +32,7 @@ class Recording:
     def __init__(self, files: Sequence[str], source: _engine.Source) -> None:
         self.files = list(files)
         self._source = source
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
         self.rig: list[Camera] = _engine.read_rig(source)
 
     def __repr__(self) -> str:
@@ -108,11 +112,39 @@ class Recording:
         return [(warning["name"], warning["text"]) for warning in self._info["warnings"]]
 
 
+def write_poses(path: Path, poses: tuple[npt.ArrayLike, npt.ArrayLike], time_unit: str = "ns") -> None:
+    """Write poses as a TUM file, which `open` and ``event-fusion map --poses`` read.
+
+    Times (n,) in a unit ('ns', 'us', 'ms', 's'), and poses (n, 4, 4), or (n, 7): tx ty tz qx qy qz qw.
+    """
+    _engine.write_poses(os.fspath(path), times_in_ns(np.asarray(poses[0]), ns_per(time_unit)), poses[1])
+
+
+def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
+    """Write a calibration as a camera chain of Kalibr, which `open` and ``event-fusion map --calibration`` read."""
+    with builtins.open(path, "w", encoding="ascii") as file:
+        file.write(_engine.format_calibration(list(cameras)))
+
+
+def read_poses(poses: Path | tuple[Array, Array], time_unit: str = "") -> tuple[Array, Array]:
+    """Return times (n,) in nanoseconds and poses (n, 4, 4) of a file, in any format that `open` reads as poses."""
+    if isinstance(poses, (str, os.PathLike)):
+        return _engine.read_pose_file(os.fspath(poses), time_unit)
+    return poses
+
+
+def read_cameras(calibration: Path | Sequence[Camera]) -> list[Camera]:
+    """Return the cameras of a calibration, in any format that `open` reads as one."""
+    if isinstance(calibration, (str, os.PathLike)):
+        return _engine.read_calibration(os.fspath(calibration))
+    return list(calibration)
+
+
 def open(
     path: Path | Sequence[Path],
     *,
-    poses: Path = "",
-    calibration: Path = "",
+    poses: Path | tuple[npt.ArrayLike, npt.ArrayLike] = "",
+    calibration: Path | Sequence[Camera] = "",
     hand_eye: Path = "",
     t0: int | str | None = None,
     t1: int | str | None = None,
@@ -132,7 +164,8 @@ def open(
     path : path or sequence of paths
         Files and folders of one recording. To read its events, neither poses nor a calibration are needed.
     poses, calibration, hand_eye : path
-        Files that replace those of the recording, as ``--poses``, ``--calibration`` and ``--hand-eye`` do.
+        Files that replace those of the recording, as ``--poses``, ``--calibration`` and ``--hand-eye`` do. Poses may be
+        (times, T_world_rig), nanoseconds (n,) and matrices (n, 4, 4), and a calibration a sequence of `Camera`.
     t0, t1 : int or str
         Only the events of [t0, t1) are read. Integers: nanoseconds on the clock of the poses. Text as on the command
         line: ``"3.2"`` is seconds on that clock, ``"+3.2"`` seconds from the first event on.
@@ -152,10 +185,22 @@ def open(
         If a time cannot be read, t1 is not above t0, or `cameras` has more or fewer numbers than the recording cameras.
     """
     files = [os.fspath(file) for file in ([path] if isinstance(path, (str, os.PathLike)) else path)]
-    given = (os.fspath(poses), os.fspath(calibration), os.fspath(hand_eye))
+    temporary = None
+    if isinstance(poses, tuple) or not isinstance(calibration, (str, os.PathLike)):
+        temporary = tempfile.TemporaryDirectory(prefix="event_fusion_")
+        if isinstance(poses, tuple):
+            file = os.path.join(temporary.name, "poses.txt")
+            write_poses(file, poses)
+            poses = file
+        if not isinstance(calibration, (str, os.PathLike)):
+            file = os.path.join(temporary.name, "camchain.yaml")
+            write_cameras(file, calibration)
+            calibration = file
     source = _engine.Source(
         files,
-        *given,
+        os.fspath(poses),
+        os.fspath(calibration),
+        os.fspath(hand_eye),
         format,
         [topics] if isinstance(topics, str) else list(topics),
         event_columns,
@@ -168,50 +213,7 @@ def open(
 
     source.set_limits(*times_in(source, t0=t0, t1=t1))
     recording = Recording(files, source)
+    recording._temporary = temporary  # its files are removed with the last user
     if cameras and len(cameras) != len(recording.rig):
         raise ValueError(f"cameras = {list(cameras)}: expected {len(recording.rig)}, as many as the recording has")
-    return recording
-
-
-def simulate(
-    preset: str = "desk_stereo",
-    seed: int = 1,
-    *,
-    duration: float | None = None,
-    out: Path | None = None,
-    progress: Progress = True,
-) -> Recording:
-    """Simulate a recording with exact ground truth: this takes some ten seconds to some minutes.
-
-    Parameters
-    ----------
-    preset : str
-        One of `simulation_presets`.
-    seed : int
-        Seed of all random values.
-    duration : float
-        Seconds, 0.001 to 600; by default the preset's.
-    out : path
-        The new folder of the recording. By default a temporary one, which lives as long as the result.
-    progress : bool or callable
-        See `map`. By default a bar, which tells how long it takes.
-
-    Returns
-    -------
-    Recording
-        With true depth maps and clouds beside it, for `event_fusion.evaluate`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such preset, or the duration is out of range.
-    OSError
-        If the folder exists and is not empty, or cannot be written.
-    """
-    temporary = tempfile.TemporaryDirectory(prefix="event_fusion_") if out is None else None
-    folder = os.fspath(out) if out is not None else str(pathlib.Path(temporary.name) / preset)  # type: ignore[union-attr]
-    with ProgressBar(progress) as on_progress:
-        _engine.simulate(folder, preset, seed, duration, on_progress)
-    recording = open(folder)
-    recording._temporary = temporary  # type: ignore[attr-defined]  # removed with the recording
     return recording

@@ -42,8 +42,11 @@ def _depth_file(value: Any, folder: pathlib.Path) -> str:
     if isinstance(value, np.ndarray):
         np.save(folder / "depth.npy", value)
         return str(folder / "depth.npy")
-    for keyframe in [value] if isinstance(value, Keyframe) else value:
-        np.save(folder / f"{keyframe.t // 10**9}.{keyframe.t % 10**9:09}.npy", keyframe.depth)
+    for i, one in enumerate([value] if isinstance(value, Keyframe) else value):
+        if isinstance(one, Keyframe):
+            np.save(folder / f"{one.t // 10**9}.{one.t % 10**9:09}.npy", one.depth)
+        else:
+            np.save(folder / f"{i}.npy", one)
     return str(folder)
 
 
@@ -66,22 +69,23 @@ def true_depth(truth: Union[Path, Recording], t: int) -> Array:
 
 
 def depth(
-    estimate: Union[Path, Map, Keyframe, Iterable[Keyframe], Array],
-    truth: Union[Path, Recording, Array],
+    estimate: Union[Path, Map, Keyframe, Iterable[Keyframe], Array, Sequence[Array]],
+    truth: Union[Path, Recording, Array, Sequence[Array]],
     *,
     tolerance_px: int = 0,
     max_depth: float | None = None,
     png_scale: float | None = None,
     mask: Path = "",
     thresholds: Sequence[float] = (),
+    focal_baseline: float | None = None,
 ) -> dict[str, Any]:
-    """Compare depth maps with the truth. Maps of a folder are paired by time, within 1 ms.
+    """Compare depth maps with the truth. Maps of a folder are paired by time, within 1 ms; arrays by their order.
 
     Parameters
     ----------
-    estimate : path, Map, Keyframe, keyframes, or array of shape (rows, columns)
+    estimate : path, Map, Keyframe, keyframes, array of shape (rows, columns), or arrays
         Metres; 0, negative values and NaN mean no depth.
-    truth : path, Recording or array
+    truth : path, Recording, array or arrays
         As the estimate.
     tolerance_px : int
         Compare with the best truth within this number of columns and rows, 0 to 100.
@@ -93,6 +97,9 @@ def depth(
         An image: only pixels that are not black are compared.
     thresholds : sequence of float
         Errors for precision and recall.
+    focal_baseline : float
+        Focal length in pixels times baseline in metres of a stereo pair, for the errors of disparity (bad_pix). By
+        default from the calibration beside the files.
 
     Returns
     -------
@@ -113,7 +120,7 @@ def depth(
         true = _depth_file(truth, pathlib.Path(folder, "truth"))
         errors: dict[str, Any] = json.loads(
             _engine.depth_errors(
-                estimated, true, tolerance_px, max_depth, png_scale, os.fspath(mask), list(thresholds)
+                estimated, true, tolerance_px, max_depth, png_scale, os.fspath(mask), list(thresholds), focal_baseline
             )
         )
     return errors

@@ -120,10 +120,10 @@ def test_a_hand_eye_transform_makes_one_map_in_all_ways(desk, tmp_path):
     T_body_rig[:3, 3] = 0.123456789, -0.2, 0.3
     np.savetxt(tmp_path / "hand_eye.txt", T_body_rig)
     times, T_world_rig = desk.poses
-    np.savez(tmp_path / "body.npz", t_ns=times, poses=T_world_rig @ np.linalg.inv(T_body_rig))
-    files = ("--poses", tmp_path / "body.npz", "--hand-eye", tmp_path / "hand_eye.txt")
+    ef.write_poses(tmp_path / "body.txt", (times, T_world_rig @ np.linalg.inv(T_body_rig)))
+    files = ("--poses", tmp_path / "body.txt", "--hand-eye", tmp_path / "hand_eye.txt")
     program("import", DESK, "-q", *files, "--out", tmp_path / "imported.rawlog")
-    recording = ef.open(DESK, poses=tmp_path / "body.npz", hand_eye=tmp_path / "hand_eye.txt")
+    recording = ef.open(DESK, poses=tmp_path / "body.txt", hand_eye=tmp_path / "hand_eye.txt")
     expected = ef.map(recording, OPTIONS).points
     assert len(expected) > 1000
     np.testing.assert_array_equal(ef.map(tmp_path / "imported.rawlog", OPTIONS).points, expected)
@@ -588,6 +588,73 @@ def test_a_simulation_is_that_of_the_program_and_shows_its_progress(tmp_path, mo
     assert not os.path.exists(path)
 
 
+def test_a_simulation_has_the_truth_of_its_recording(tmp_path):
+    simulation = ef.Simulation("desk_stereo", duration=0.1)
+    recording = simulation.record(tmp_path / "desk", progress=False)
+    times, poses = simulation.poses()
+    np.testing.assert_array_equal(times, recording.poses[0])
+    np.testing.assert_allclose(poses, recording.poses[1], atol=1e-9)
+    made = simulation.events()
+    for camera, (events, points) in enumerate(made):
+        np.testing.assert_array_equal(events, np.concatenate(list(recording.events(camera))))
+        assert points.shape == (len(events), 3)
+    # Events lie where the camera sees their points.
+    events, points = made[0]
+    t = int(events["t"][len(events) // 2])
+    now = np.abs(events["t"] - t) < 200_000
+    in_camera = (np.linalg.inv(simulation.poses([t])[1][0]) @ np.c_[points[now], np.ones(now.sum())].T)[:3]
+    pixels = (simulation.cameras[0].K @ in_camera / in_camera[2])[:2]
+    assert np.median(np.hypot(pixels[0] - events["x"][now], pixels[1] - events["y"][now])) < 0.7
+    # The keyframe of a window is that of `dsi`; its truth at a time of the folder is the folder's.
+    options = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "dsi.num_planes": 60}
+    window = simulation.start, simulation.start + 10**8, simulation.start + 5 * 10**7
+    keyframe = ef.keyframes(simulation.cameras, [events for events, _ in made], simulation.poses(), [window], options)[0]
+    assert keyframe.window == window[:2] and keyframe.t == window[2]
+    of_dsi = ef.dsi(recording, *window[:2], {**options, "filter.hot_pixels": False}, t_ref=window[2]).keyframe
+    np.testing.assert_allclose(keyframe.depth, of_dsi.depth, rtol=1e-5)
+    truth = simulation.depth(keyframe)
+    np.testing.assert_array_equal(truth, ef.evaluate.true_depth(recording, keyframe.t))
+    both = ef.evaluate.depth([keyframe.depth, 0 * truth], [truth, truth], focal_baseline=10)
+    assert both["all"]["points"] == np.count_nonzero((keyframe.depth > 0) & (truth > 0))
+    assert both["all"]["bad_pix_5px"] < 0.2 and len(both["maps"]) == 2
+    # Other cameras and another motion in the scene of a preset.
+    small = ef.Camera(100, 80, [[60, 0, 50], [0, 60, 40], [0, 0, 1]])
+    other = ef.Simulation("desk_stereo", calibration=[small], trajectory=simulation.poses(), duration=0.05)
+    assert other.cameras[0].width == 100 and len(other.events()) == 1
+    assert simulation.surfaces.shape[1:] == (3, 3)
+
+
+def test_poses_and_cameras_are_written_and_read(desk, tmp_path):
+    ef.write_poses(tmp_path / "poses.txt", desk.poses)
+    ef.write_cameras(tmp_path / "camchain.yaml", desk.rig)
+    for written, read in zip(desk.poses, ef.read_poses(tmp_path / "poses.txt")):
+        np.testing.assert_array_equal(written, read)
+    turned = desk.rig[1].T_rig_cam.copy()
+    turned[:3, :3] = turned[:3, :3] @ np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    right = ef.Camera(346, 260, desk.rig[1].K, T_rig_cam=turned)
+    changed = ef.open(DESK, calibration=[desk.rig[0], right], poses=ef.perturb(desk.poses, {"noise_m": 0.1, "seed": 3}))
+    np.testing.assert_allclose(changed.rig[1].T_rig_cam, turned, atol=1e-12)
+    off = np.linalg.norm(changed.poses[1][:, :3, 3] - desk.poses[1][:, :3, 3], axis=1)
+    assert 0.1 < np.median(off) < 0.2
+    assert ef.read_cameras(tmp_path / "camchain.yaml")[1].K.tolist() == desk.rig[1].K.tolist()
+    with pytest.raises(ValueError, match="noise_x"):
+        ef.perturb(desk.poses, {"noise_x": 1})
+
+
+def test_the_errors_for_other_numpy_files_name_lines_that_work(desk, tmp_path):
+    events = np.concatenate(list(desk.events()))[:5000]
+    np.savez(tmp_path / "own.npz", xs=events["x"], ys=events["y"], pol=events["p"], ts=events["t"] // 1000)
+    with pytest.raises(OSError) as error:
+        ef.open(tmp_path / "own.npz")
+    python = re.search(r"import numpy.*?(?=, if these)", str(error.value)).group(0)
+    subprocess.run([sys.executable, "-c", python], cwd=tmp_path, check=True)
+    read = np.concatenate(list(ef.open(tmp_path / "events.npy", time_unit="ns").events()))
+    np.testing.assert_array_equal(read, events)
+    np.savez(tmp_path / "poses.npz", t=desk.poses[0] * 1e-9, T=desk.poses[1])
+    with pytest.raises(OSError, match="ef.write_poses"):
+        ef.open(DESK, poses=tmp_path / "poses.npz")
+
+
 def test_a_live_mapper_maps_in_its_own_thread(desk):
     keyframes = []
     mapper = ef.Mapper({**OPTIONS, "live.enabled": True, "live.max_queue_mb": 1000}, keyframes.append)
@@ -602,8 +669,7 @@ def test_points_are_in_the_world_wherever_it_is(far, desk, made, tmp_path):
     times, poses = desk.poses
     poses = poses.copy()
     poses[:, :3, 3] += far
-    np.savez(tmp_path / "utm.npz", t_ns=times, poses=poses)
-    recording = ef.open(DESK, poses=tmp_path / "utm.npz")
+    recording = ef.open(DESK, poses=(times, poses))
     mapper = ef.Mapper(OPTIONS)
     for camera in desk.rig:
         mapper.add_camera(camera)
@@ -796,6 +862,12 @@ def test_the_examples_run(tmp_path):
     assert "pixels have a depth" in example("dsi_to_numpy.py", part, "+0.1", "+0.3")
     assert example("option_study.py", part, "fusion.across_cameras", "min", "harmonic").count("wrong by") == 2
     assert example("compare_maps.py", "own.pcd", "own.pcd", DESK).count("median error") == 2
+    example("export_dsec.py", part, "hdf5")
+    exported, recorded = ef.open(tmp_path / "hdf5"), ef.open(part)
+    for camera in (0, 1):
+        np.testing.assert_array_equal(*(np.concatenate(list(of.events(camera, 10**5))) for of in (exported, recorded)))
+    late = ef.open(tmp_path / "hdf5", t0="+0.3")  # by the index
+    np.testing.assert_array_equal(next(late.events())["t"], next(ef.open(part, t0="+0.3").events())["t"])
     keyframes = {os.path.splitext(file)[0] for file in os.listdir(tmp_path / "depths")}
     assert len(keyframes) > 0
     for file in ("own.pcd", "dsi.npz", "study.pdf", "compared.pdf", *(f"depths/{t}.npy" for t in keyframes)):
