@@ -50,14 +50,14 @@ jobs_table() {
   done
   for recording in desk trinocular; do
     echo "$recording.evaluate fusion map \$i/$recording -q --out out
-      fusion evaluate depth out \$i/$recording --json --plot depth.png
-      fusion evaluate map out \$i/$recording --json --plot map.png --to-find \$i/$recording/gt_edges.ply
+      fusion evaluate depth out \$i/$recording --json
+      fusion evaluate map out \$i/$recording --json --to-find \$i/$recording/gt_edges.ply
       fusion evaluate trajectory out/trajectory.txt \$i/$recording/poses.txt --json" | tr '\n' ';'
     echo
   done
   echo 'desk.rawlog fusion import $i/desk --out r.rawlog; fusion info r.rawlog; fusion map r.rawlog --out out
     echo "[none]" > host.ini; host host.ini "" r.rawlog saved
-    for to in folder mcap dsec; do fusion export r.rawlog --to $to --t1 1.5 --out e_$to; done' | tr '\n' ';'
+    for to in folder mcap; do fusion export r.rawlog --to $to --t1 1.5 --out e_$to; done' | tr '\n' ';'
   echo
   while read -r name needs sources; do
     local arguments='' source
@@ -77,7 +77,7 @@ csv - text/csv
 gz - text/gz
 zip - text/zip
 evimo2 cp evimo2/left_camera/sfm/eval/scene_00 evimo2/right_camera/sfm/eval/scene_00
-numpy cp numpy/metavision/cam0.npy numpy/deflated/cam1.npz
+numpy cp numpy/metavision/cam0.npy numpy/fields/cam1.npy
 e2vid cp hdf5/e2vid/left.h5 hdf5/e2vid/right.h5
 dsec cp hdf5/dsec
 tum_vie cp hdf5/tum_vie

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/point_cloud_file.h"
 
-#include <liblzf/lzf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -117,40 +115,6 @@ Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField
   return origin;
 }
 
-PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> fields,
-                                 std::uint64_t points) {
-  const auto is_padding = [](const RecordField& field) { return field.name == "_"; };
-  fields.erase(std::remove_if(fields.begin(), fields.end(), is_padding),
-               fields.end());  // a compressed file has no padding
-
-  if (scanner.left() < 8) scanner.reject("expected the sizes of the compressed points, 8 bytes");
-  const std::uint64_t packed_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
-  const std::uint64_t plain_bytes = numberFrom<std::uint32_t>(scanner.take(4).data(), false);
-  const std::size_t record_bytes = std::max<std::size_t>(bytesOf(fields), 1);
-  if (plain_bytes % record_bytes != 0 || plain_bytes / record_bytes != points) {
-    scanner.reject(std::to_string(plain_bytes) + " bytes when decompressed: expected " +
-                   std::to_string(points) + " points of " + std::to_string(record_bytes) +
-                   " bytes");
-  }
-  constexpr std::uint64_t kMaxRatio = 88;  // of LZF: 3 bytes unpack to 264 at most
-  if (scanner.left() < packed_bytes || plain_bytes > packed_bytes * kMaxRatio) {
-    scanner.reject(std::to_string(scanner.left()) + " bytes are left: expected " +
-                   std::to_string(packed_bytes) + " that decompress to " +
-                   std::to_string(plain_bytes) + ": is the file cut short?");
-  }
-  std::string plain(static_cast<std::size_t>(plain_bytes), '\0');
-  const TextScanner packed_start = scanner;
-  const std::string_view packed = scanner.take(static_cast<std::size_t>(packed_bytes));
-  if (!plain.empty() &&
-      lzf_decompress(packed.data(), static_cast<unsigned int>(packed.size()), plain.data(),
-                     static_cast<unsigned int>(plain.size())) != plain.size()) {
-    packed_start.reject(std::to_string(packed_bytes) + " compressed bytes: expected " +
-                        std::to_string(plain_bytes) + " when decompressed: is the file damaged?");
-  }
-  TextScanner plain_scanner(plain);
-  return readBinaryRecords(plain_scanner, fields, points, {false, true});
-}
-
 }  // namespace
 
 void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
@@ -186,16 +150,12 @@ PointCloudContent parsePcd(std::string_view bytes) {
   const WordLine& data = lines.at("DATA");
   const std::string_view encoding = data.words.size() == 2 ? data.words[1] : std::string_view{};
 
-  PointCloudContent content;
-  if (encoding == "ascii") {
-    content = readTextRecords(scanner, fields, points);
-  } else if (encoding == "binary") {
-    content = readBinaryRecords(scanner, fields, points, {});
-  } else if (encoding == "binary_compressed") {
-    content = readCompressed(scanner, fields, points);
-  } else {
-    data.reject("DATA " + inQuotes(encoding) + ": expected ascii, binary or binary_compressed");
+  if (encoding != "binary") {
+    data.reject("DATA " + inQuotes(encoding) +
+                ": expected binary; pcl_convert_pcd_ascii_binary FILE NEW.pcd 1 converts the file "
+                "(Debian: pcl-tools)");
   }
+  PointCloudContent content = readRecords(scanner, fields, points);
   scanner.expectEnd();
   const Eigen::Vector3d origin = originOf(lines, fields);
   for (CloudPoint& point : content.points) point.p_world += origin;

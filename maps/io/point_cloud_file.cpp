@@ -41,16 +41,14 @@ PointCloudContent readPointCloud(const std::filesystem::path& path) {
 
 namespace {
 
-struct PlyElement {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<RecordField> fields;
-  std::size_t list_line = 0;  ///< Number of the line with a list property; 0: none.
-};
+/// The command that converts other files, for errors.
+constexpr const char* kConvert =
+    "; pcl_ply2pcd FILE NEW.pcd converts the file to PCD (Debian: pcl-tools)";
 
 struct PlyHeader {
-  std::string format;
-  std::vector<PlyElement> elements;
+  std::uint64_t vertices = 0;
+  std::vector<RecordField> fields;  ///< Of a vertex.
+  bool is_whole = true;             ///< False: other elements are behind the vertices.
 };
 
 NumberType numberType(const WordLine& line, std::string_view name) {
@@ -73,30 +71,18 @@ NumberType numberType(const WordLine& line, std::string_view name) {
   return type->second;
 }
 
-std::string readFormat(const WordLine& line) {
-  const bool known = line.words.size() == 3 && line.words[0] == "format" &&
-                     (line.words[1] == "ascii" || line.words[1] == "binary_little_endian" ||
-                      line.words[1] == "binary_big_endian") &&
-                     line.words[2] == "1.0";
-  if (!known) {
-    line.reject(
-        "not a known format: expected format ascii 1.0, format binary_little_endian 1.0 or "
-        "format binary_big_endian 1.0");
-  }
-  return std::string(line.words[1]);
+void requireFormat(const WordLine& line) {
+  const std::vector<std::string_view> expected = {"format", "binary_little_endian", "1.0"};
+  if (line.words == expected) return;
+  line.reject("expected format binary_little_endian 1.0" + std::string(kConvert));
 }
 
-void readProperty(const WordLine& line, std::vector<PlyElement>& elements) {
-  if (elements.empty()) line.reject("a property: expected an element before it");
-  PlyElement& element = elements.back();
-  if (line.words.size() == 5 && line.words[1] == "list") {
-    element.list_line = line.number;
-    return;
+RecordField propertyOf(const WordLine& line) {
+  if (line.words.size() > 1 && line.words[1] == "list") {
+    line.reject("a list in element vertex: expected single numbers");
   }
-  if (line.words.size() != 3) {
-    line.reject("expected property TYPE NAME or property list TYPE TYPE NAME");
-  }
-  element.fields.push_back({std::string(line.words[2]), numberType(line, line.words[1]), 1});
+  if (line.words.size() != 3) line.reject("expected property TYPE NAME");
+  return {std::string(line.words[2]), numberType(line, line.words[1]), 1};
 }
 
 PlyHeader readHeader(TextScanner& scanner) {
@@ -104,43 +90,33 @@ PlyHeader readHeader(TextScanner& scanner) {
     WordLine{1, {}}.reject("not a PLY file: expected ply");
   }
   PlyHeader header;
+  bool has_format = false;
+  int elements = 0;
   while (true) {
     const WordLine line = wordLine(scanner, "a line of a PLY header, up to end_header");
     const std::string_view key = line.words.empty() ? std::string_view{} : line.words[0];
     if (key == "comment" || key == "obj_info") continue;
-    if (header.format.empty()) {
-      header.format = readFormat(line);
+    if (!has_format) {
+      requireFormat(line);
+      has_format = true;
     } else if (key == "element") {
       if (line.words.size() != 3) line.reject("expected element NAME COUNT");
-      header.elements.push_back({std::string(line.words[1]), line.count(2), {}, 0});
+      if (elements == 0 && line.words[1] != "vertex") {
+        line.reject("expected element vertex first" + std::string(kConvert));
+      }
+      if (elements == 0) header.vertices = line.count(2);
+      if (elements > 0 && line.count(2) > 0) header.is_whole = false;
+      ++elements;
+    } else if (elements == 0) {
+      line.reject(inQuotes(key) + ": expected element vertex COUNT");
     } else if (key == "property") {
-      readProperty(line, header.elements);
+      if (elements == 1) header.fields.push_back(propertyOf(line));
     } else if (key == "end_header") {
       return header;
     } else {
       line.reject(inQuotes(key) + ": expected comment, obj_info, element, property or end_header");
     }
   }
-}
-
-/// Skips an element before the vertices.
-void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
-  if (is_text) {
-    for (std::uint64_t i = 0; i < element.count; ++i) scanner.line("an element " + element.name);
-    return;
-  }
-  if (element.list_line != 0 && element.count != 0) {
-    WordLine{element.list_line, {}}.reject("a list in element " + printable(element.name) +
-                                           ": expected lists behind element vertex alone");
-  }
-  const std::size_t bytes = bytesOf(element.fields);
-  if (bytes == 0) return;
-  if (scanner.left() / bytes < element.count) {
-    scanner.reject(std::to_string(scanner.left()) + " bytes are left: expected " +
-                   std::to_string(element.count) + " elements " + printable(element.name) + " of " +
-                   std::to_string(bytes) + " bytes: is the file cut short?");
-  }
-  scanner.take(static_cast<std::size_t>(element.count) * bytes);
 }
 
 }  // namespace
@@ -180,27 +156,8 @@ void writePlyTo(std::ostream& stream, const MapCloud& cloud,
 PointCloudContent parsePly(std::string_view bytes) {
   TextScanner scanner(bytes);
   const PlyHeader header = readHeader(scanner);
-  const WordLine end_of_header{scanner.lineNumber(), {}};
-  const bool is_text = header.format == "ascii";
-  const auto vertex =
-      std::find_if(header.elements.begin(), header.elements.end(),
-                   [](const PlyElement& element) { return element.name == "vertex"; });
-  if (vertex == header.elements.end()) {
-    end_of_header.reject("end_header without an element vertex: expected one before");
-  }
-  if (vertex->list_line != 0) {
-    WordLine{vertex->list_line, {}}.reject("a list in element vertex: expected single numbers");
-  }
-  for (auto before = header.elements.begin(); before != vertex; ++before) {
-    skip(scanner, *before, is_text);
-  }
-  PointCloudContent content =
-      is_text ? readTextRecords(scanner, vertex->fields, vertex->count)
-              : readBinaryRecords(scanner, vertex->fields, vertex->count,
-                                  {header.format == "binary_big_endian", false});
-  const bool is_last = std::all_of(vertex + 1, header.elements.end(),
-                                   [](const PlyElement& element) { return element.count == 0; });
-  if (is_last) scanner.expectEnd();
+  PointCloudContent content = readRecords(scanner, header.fields, header.vertices);
+  if (header.is_whole) scanner.expectEnd();
   return content;
 }
 

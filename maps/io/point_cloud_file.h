@@ -27,11 +27,11 @@ struct PointCloudContent {
   std::uint64_t non_finite = 0;    ///< Number of points left out: a coordinate is not finite.
 };
 
-/// Reads a PCD file (ascii, binary or binary_compressed) or a PLY file (ascii or binary, either
-/// byte order). The extension of the path selects the format. The fields x, y, z and the optional
-/// intensity may have any numeric type. Doubles keep all their digits. The confidence is the
-/// intensity, or 1 without one; the support is 1. Other fields, other elements and the viewpoint of
-/// a PCD file are ignored.
+/// Reads a binary PCD file, or a binary little-endian PLY file whose first element is the vertices;
+/// the error for another encoding names the command that converts it. The extension of the path
+/// selects the format. The fields x, y, z and the optional intensity may have any numeric type.
+/// Doubles keep all their digits. The confidence is the intensity, or 1 without one; the support is
+/// 1. Other fields, other elements and the viewpoint of a PCD file are ignored.
 PointCloudContent readPointCloud(const std::filesystem::path& path);
 
 /// Writes a binary PCD file, version 0.7.
@@ -50,7 +50,7 @@ void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                 const std::vector<PointColour>& colours,
                 const std::vector<StampedPose>& views = {});
 
-/// Parses the Stanford polygon format, version 1.0. The element `vertex` is the cloud.
+/// Parses a binary little-endian file of the Stanford polygon format, version 1.0.
 PointCloudContent parsePly(std::string_view bytes);
 
 }  // namespace efm

@@ -2,11 +2,8 @@
 #include "maps/io/point_record.h"
 
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
-#include <type_traits>
 
 #include "mapping/base/text.h"
 
@@ -39,7 +36,8 @@ void TextScanner::reject(const std::string& why) const {
 }
 
 void TextScanner::expectEnd() const {
-  if (rest_.find_first_not_of(" \t\r\n") == std::string_view::npos) return;
+  constexpr std::string_view kPadding(" \t\r\n\0", 5);  // PCL pads binary files with zeros
+  if (rest_.find_first_not_of(kPadding) == std::string_view::npos) return;
   reject(std::to_string(rest_.size()) + " more bytes: expected the end of the file");
 }
 
@@ -101,38 +99,6 @@ void append(PointCloudContent& content, const Values& values) {
   }
 }
 
-/// Rounds to the type of the field, as a binary file does.
-template <typename Real>
-bool parseReal(std::string_view word, double& value) {
-  Real number = 0;
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(word.data(), end, number);
-  if (stop != end) return false;
-  if (error == std::errc::result_out_of_range) {  // too large, or so small that it is zero
-    long double wide = 0;
-    if (std::from_chars(word.data(), end, wide).ec != std::errc() || std::abs(wide) > 1) {
-      return false;
-    }
-    number = static_cast<Real>(wide);
-  }
-  value = static_cast<double>(number);
-  return error == std::errc() || error == std::errc::result_out_of_range;
-}
-
-bool parseAs(NumberType type, std::string_view word, double& value) {
-  return withNumberOf(type, [&](auto zero) {
-    using Number = decltype(zero);
-    if constexpr (std::is_floating_point_v<Number>) {
-      return parseReal<Number>(word, value);
-    } else {
-      using Whole = std::conditional_t<std::is_signed_v<Number>, std::int64_t, std::uint64_t>;
-      const std::optional<Whole> number = parseNumber<Whole>(word);
-      value = static_cast<double>(number.value_or(0));
-      return number.has_value();
-    }
-  });
-}
-
 }  // namespace
 
 std::size_t bytesOf(const std::vector<RecordField>& fields) {
@@ -141,43 +107,8 @@ std::size_t bytesOf(const std::vector<RecordField>& fields) {
   return bytes;
 }
 
-PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
-                                  std::uint64_t count) {
-  const FieldIndices indices = findFields(fields);
-  std::size_t numbers = 0;
-  for (const RecordField& field : fields) numbers += field.count;
-
-  PointCloudContent content;
-  for (std::uint64_t i = 0; i < count;) {
-    const WordLine line =
-        wordLine(scanner, "point " + std::to_string(i + 1) + " of " + std::to_string(count));
-    if (line.words.empty()) continue;
-    if (line.words.size() != numbers) {
-      line.reject("point " + std::to_string(i + 1) + " has " + std::to_string(line.words.size()) +
-                  " numbers: expected " + std::to_string(numbers));
-    }
-    Values values = {0, 0, 0, 1};
-    auto word = line.words.begin();
-    for (std::size_t at = 0; at < fields.size(); ++at) {
-      for (std::size_t n = 0; n < fields[at].count; ++n, ++word) {
-        double value = 0;
-        if (!parseAs(fields[at].type, *word, value)) {
-          line.reject(printable(fields[at].name) + " " + inQuotes(*word) +
-                      ": expected a number of the field's type");
-        }
-        for (std::size_t j = 0; j < indices.size(); ++j) {
-          if (indices[j] == at) values[j] = value;
-        }
-      }
-    }
-    append(content, values);
-    ++i;
-  }
-  return content;
-}
-
-PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
-                                    std::uint64_t count, const RecordOrder& order) {
+PointCloudContent readRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
+                              std::uint64_t count) {
   const FieldIndices indices = findFields(fields);
   const std::size_t record_bytes = bytesOf(fields);
   if (scanner.left() / record_bytes < count) {
@@ -194,8 +125,7 @@ PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<Reco
     const std::size_t size = fields[at].count * sizeOf(fields[at].type);
     for (std::size_t j = 0; j < indices.size(); ++j) {
       if (indices[j] != at) continue;
-      columns[j] = Column{bytes + (order.by_field ? points * before : before),
-                          order.by_field ? size : record_bytes, fields[at].type, order.big_endian};
+      columns[j] = Column{bytes + before, record_bytes, fields[at].type, false};
     }
     before += size;
   }

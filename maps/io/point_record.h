@@ -32,7 +32,7 @@ class TextScanner {
 
   /// @throws std::runtime_error naming the next byte, counted from 0.
   [[noreturn]] void reject(const std::string& why) const;
-  /// @throws std::runtime_error if anything but white space is left.
+  /// @throws std::runtime_error if anything but white space and zeros is left.
   void expectEnd() const;
 
  private:
@@ -62,20 +62,12 @@ struct RecordField {
   std::size_t count = 1;
 };
 
-/// The order of the bytes of points.
-struct RecordOrder {
-  bool big_endian = false;
-  bool by_field = false;  ///< True: field by field, of all points. False: point by point.
-};
-
 /// Returns the bytes of one point.
 std::size_t bytesOf(const std::vector<RecordField>& fields);
 
-/// These functions read `count` points: lines of numbers (blank lines are skipped), or records of
-/// `bytesOf(fields)` bytes. The rest of the file is left to the caller.
-PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
-                                  std::uint64_t count);
-PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
-                                    std::uint64_t count, const RecordOrder& order);
+/// Reads `count` points: little-endian records of `bytesOf(fields)` bytes. The rest of the file is
+/// left to the caller.
+PointCloudContent readRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
+                              std::uint64_t count);
 
 }  // namespace efm

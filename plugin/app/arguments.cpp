@@ -81,7 +81,11 @@ void setFaults(const std::vector<std::string>& assignments, TrackerFaults& fault
 /// Returns the option files of the program, for the end of a help text.
 std::string configList() {
   const std::string list = fmt::format("{}", fmt::join(configNames(), ", "));
-  return list.empty() ? "" : "Option files that come with the program: " + list;
+  const std::string first =
+      "Options of --set that matter first (config/default.ini explains all): dsi.min_depth_m, "
+      "dsi.max_depth_m, dsi.num_planes, keyframes.window_s, keyframes.stride_s, rig.cameras, "
+      "map.voxel_size_m, refinement.enabled, live.enabled";
+  return list.empty() ? first : first + "\nOption files that come with the program: " + list;
 }
 
 /// Takes an option file before the sources as --config.
@@ -182,7 +186,7 @@ void addSource(CLI::App& command, RecordingSource& source) {
       .add_option(
           "--poses", source.poses,
           "Poses that replace the recording's, of the rig in the world: text (t tx ty tz qx qy qz "
-          "qw, or columns with a header), NumPy arrays, or a recording with poses")
+          "qw, or columns with a header), or a recording with poses")
       ->type_name("FILE");
   command
       .add_option("--calibration", source.calibration,

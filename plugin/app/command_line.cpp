@@ -52,11 +52,16 @@ void addImport(CLI::App& app, Run& run) {
 
 void addExport(CLI::App& app, Run& run) {
   CLI::App& command =
-      *app.add_subcommand("export", "Write a recording for other tools: text, DSEC's HDF5, MCAP");
+      *app.add_subcommand("export", "Write a recording for other tools: text, MCAP");
   auto arguments = argumentsOf(command, run, runExport);
   addSource(command, arguments->source);
+  const auto name_example = [](const std::string& format) {
+    return format == "dsec" ? "'dsec': Python writes it: examples/python/export_dsec.py"
+                            : std::string();
+  };
   command.add_option("--to", arguments->format, "The format to write")
       ->required()
+      ->check(CLI::Validator(name_example, ""))
       ->check(oneOf(exportFormats()));
   command.add_option("--out", arguments->out, "The folder or the file to write; a new one")
       ->required()

@@ -148,7 +148,6 @@ struct EvaluateArguments {
   std::filesystem::path estimate;
   std::filesystem::path truth;
   bool json = false;
-  std::filesystem::path plot;  ///< Empty: no plot.
 };
 
 struct EvaluateDepthArguments : EvaluateArguments {

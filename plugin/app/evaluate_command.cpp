@@ -12,8 +12,6 @@
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
-#include "plugin/playback/output_checks.h"
-#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {
@@ -34,27 +32,25 @@ std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& argum
   return stereo;
 }
 
-/// Rejects a plot that would replace an input. Inputs may be folders whose files are read.
-/// @param third input beside the estimate and the truth; may be empty.
-void rejectPlotOver(const EvaluateArguments& arguments, const std::filesystem::path& third = {}) {
-  if (arguments.plot.empty()) return;
-  const std::vector<std::filesystem::path> inputs = {arguments.estimate, arguments.truth, third};
-  rejectReplacing(arguments.plot, inputs);
-  rejectFileIn(inputs, arguments.plot);
-}
-
-/// Writes the plot, if asked for, and prints the errors.
-template <typename Plot>
-int finish(const EvaluateArguments& arguments, const std::string& table, const std::string& json,
-           Plot plot) {
-  if (!arguments.plot.empty()) writePicture(arguments.plot, plot());
+/// Prints the errors.
+int finish(const EvaluateArguments& arguments, const std::string& table, const std::string& json) {
   std::cout << (arguments.json ? json : table);
   return 0;
 }
 
-void addOutput(CLI::App& command, EvaluateArguments& arguments, const std::string& plotted) {
+/// Adds the options of the output, after estimate and truth.
+/// @param figure the call of Python that draws what `--plot` drew in earlier versions.
+void addOutput(CLI::App& command, EvaluateArguments& arguments, const char* figure) {
   command.add_flag("--json", arguments.json, "Print JSON instead of a table; the keys are below");
-  command.add_option("--plot", arguments.plot, "Also draw " + plotted)->type_name("FILE.png");
+  const auto reject = [figure, &arguments](const std::string& file) {
+    const std::string drawn =
+        fmt::format(fmt::runtime(figure), arguments.estimate.string(), arguments.truth.string());
+    throw CLI::ValidationError(
+        "--plot", fmt::format("Python draws figures: python3 -c 'import event_fusion as ef; from "
+                              "event_fusion import plot; {}.figure.savefig(\"{}\")'",
+                              drawn, file));
+  };
+  command.add_option_function<std::string>("--plot", reject)->group("");  // not in --help
 }
 
 /// Adds an option with a list of positive numbers.
@@ -117,8 +113,7 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
           "error is within the threshold), recall (fraction of the true pixels with such an "
           "estimate) and F1")
       ->capture_default_str();
-  addOutput(command, *arguments,
-            "estimate, truth and error side by side, and precision, recall and F1");
+  addOutput(command, *arguments, R"(plot.precision_recall(ef.evaluate.depth("{}", "{}")))");
   command.footer(depthEvaluationKeys());
 }
 
@@ -144,7 +139,7 @@ void addEvaluateMap(CLI::App& evaluate, Run& run) {
   addList(command, "--distances", arguments->options.distances_m,
           "Distances in metres for completeness and outliers")
       ->capture_default_str();
-  addOutput(command, *arguments, "accuracy, completeness and F1 over the distance");
+  addOutput(command, *arguments, R"(plot.precision_recall(ef.evaluate.map("{}", "{}")))");
   command.footer(cloudEvaluationKeys());
 }
 
@@ -186,32 +181,28 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
           "--deltas and --frames: over 10 to 50 % of the true length, 1 second and 1 frame");
   addList(command, "--deltas", arguments->deltas_s, "Relative errors over these times in seconds");
   addList(command, "--frames", arguments->frames, "Relative errors over these numbers of pairs");
-  addOutput(command, *arguments, "both trajectories, and the errors over time");
+  addOutput(command, *arguments,
+            R"py(plot.trajectory(ef.read_poses("{}"), ef.read_poses("{}")))py");
   command.footer(trajectoryEvaluationKeys());
 }
 
 }  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
-  rejectPlotOver(arguments, arguments.options.mask);
   const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
   DepthEvaluationOptions options = arguments.options;
   if (stereo) options.focal_baseline = stereo->focal_px * stereo->baseline_m;
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
-  return finish(arguments, evaluationTable(evaluation, stereo), evaluationJson(evaluation, stereo),
-                [&] { return evaluationPlot(evaluation, options); });
+  return finish(arguments, evaluationTable(evaluation, stereo), evaluationJson(evaluation, stereo));
 }
 
 int runEvaluateMap(const EvaluateMapArguments& arguments) {
-  rejectPlotOver(arguments, arguments.options.to_find);
   const CloudEvaluation evaluation =
       evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
-  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation),
-                [&] { return evaluationPlot(evaluation); });
+  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation));
 }
 
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
-  rejectPlotOver(arguments);
   using Unit = RelativeSpacing::Unit;
   TrajectoryEvaluationOptions options = arguments.options;
   options.alignment = valueIn(kTrajectoryAlignments, arguments.alignment);
@@ -222,8 +213,7 @@ int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
   }
   const TrajectoryEvaluation evaluation =
       evaluateTrajectory(arguments.estimate, arguments.truth, options);
-  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation),
-                [&] { return evaluationPlot(evaluation); });
+  return finish(arguments, evaluationTable(evaluation), evaluationJson(evaluation));
 }
 
 void addEvaluate(CLI::App& app, Run& run) {

@@ -98,9 +98,6 @@ const std::vector<ExportFormat>& formats() {
   static const std::vector<ExportFormat> all = {
       {"folder", openFolderWriter},
       {"mcap", openMcapWriter},
-#ifdef EFM_WITH_HDF5
-      {"dsec", openHdf5Writer},
-#endif
   };
   return all;
 }

@@ -8,7 +8,6 @@
 #include "maps/io/point_cloud_file.h"
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/evaluation_text.h"
-#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 namespace {
@@ -149,17 +148,6 @@ std::string cloudEvaluationKeys() {
          "            4x4 matrix, rows; turns about the origin, then moves), points (of the map,\n"
          "            that were compared with the truth), points_used (of these, in the last\n"
          "            round)\n";
-}
-
-cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
-  CurvePlot plot = fractionPlot(asJson(evaluation)["curve"], "distance_m",
-                                {{"within", "accuracy: map to truth"},
-                                 {"completeness", "completeness: truth to map"},
-                                 {"f1", "F1"}});
-  plot.title = "map and truth";
-  plot.x.label = "distance [m]";
-  plot.y.label = "within [%]";
-  return drawCurves(plot);
 }
 
 }  // namespace efm

@@ -55,7 +55,4 @@ std::string evaluationJson(const CloudEvaluation& evaluation);
 /// Returns the description of the JSON's keys, for the program's help.
 std::string cloudEvaluationKeys();
 
-/// Draws accuracy, completeness and F1 over the distance.
-cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation);
-
 }  // namespace efm

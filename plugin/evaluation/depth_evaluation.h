@@ -75,10 +75,4 @@ std::string evaluationJson(const DepthEvaluation& evaluation,
 /// Returns the description of the JSON's keys, for the program's help.
 std::string depthEvaluationKeys();
 
-/// Draws estimate, truth and error of one map side by side: the map with the median number of
-/// points. Below are precision, recall and F1 over the threshold and, if there are several maps,
-/// their errors over time. Reads the files of the drawn map again.
-/// @throws std::runtime_error as `evaluateDepth` does.
-cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options);
-
 }  // namespace efm

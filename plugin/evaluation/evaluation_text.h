@@ -7,14 +7,11 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
-
-#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 
-/// The errors of an evaluation, as --json prints them. Tables and plots show their numbers.
+/// The errors of an evaluation, as --json prints them. Tables show their numbers.
 using EvaluationJson = nlohmann::ordered_json;
 
 inline std::string jsonText(const EvaluationJson& json) {
@@ -71,27 +68,6 @@ inline std::vector<TableRow> tableRows(const std::vector<TableColumn>& columns,
     }
   }
   return rows;
-}
-
-/// Returns a plot of fractions, in percent, over a distance or an error in metres.
-/// @param steps a list of objects.
-/// @param x_key the key of the metres.
-/// @param fractions key and label of each curve.
-inline CurvePlot fractionPlot(const EvaluationJson& steps, const char* x_key,
-                              const std::vector<std::pair<const char*, const char*>>& fractions) {
-  CurvePlot plot;
-  plot.x.scale = AxisScale::kLogarithmic;
-  plot.y.from = 0;
-  plot.y.to = 102;
-  for (const auto& [key, label] : fractions) {
-    std::vector<cv::Point2d> points;
-    for (const EvaluationJson& step : steps) {
-      points.emplace_back(step[x_key], 100 * double(step[key]));
-    }
-    std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
-    plot.curves.push_back({label, points, CurveStyle::kMarkedLine});
-  }
-  return plot;
 }
 
 }  // namespace efm

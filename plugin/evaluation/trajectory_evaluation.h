@@ -68,8 +68,4 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation);
 /// Returns the description of the JSON's keys, for the program's help.
 std::string trajectoryEvaluationKeys();
 
-/// Draws both trajectories, with the estimate aligned, and the absolute errors over time. The view
-/// is along the axis on which the truth's extent is smallest; if extents are equal, from above.
-cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation);
-
 }  // namespace efm

@@ -66,14 +66,4 @@ void rejectReplacing(const fs::path& out, const std::vector<fs::path>& inputs) {
   }
 }
 
-void rejectFileIn(const std::vector<fs::path>& folders, const fs::path& out) {
-  std::error_code ignored;
-  if (!fs::exists(out, ignored)) return;
-  for (const fs::path& folder : folders) {
-    if (!fs::is_directory(folder, ignored) || !isBelow(resolved(out), resolved(folder))) continue;
-    throw std::runtime_error(out.string() + ": it may be an input, as it is in " + folder.string() +
-                             ": expected a file that does not exist yet");
-  }
-}
-
 }  // namespace efm

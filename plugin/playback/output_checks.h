@@ -17,8 +17,4 @@ std::vector<std::filesystem::path> inputsOf(const RecordingSource& source);
 void rejectReplacing(const std::filesystem::path& out,
                      const std::vector<std::filesystem::path>& inputs);
 
-/// Rejects an existing file in a folder that is read.
-void rejectFileIn(const std::vector<std::filesystem::path>& folders,
-                  const std::filesystem::path& out);
-
 }  // namespace efm

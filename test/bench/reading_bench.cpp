@@ -23,9 +23,6 @@
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
 #include "test/plugin/recordings/sensors/evt_words.h"
-#ifdef EFM_WITH_HDF5
-#include "plugin/recordings/writers/recording_writer.h"
-#endif
 
 namespace efm::bench {
 namespace {
@@ -117,16 +114,6 @@ void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
     events << line.data();
   }
 }
-
-#ifdef EFM_WITH_HDF5
-/// Writes the window in DSEC's layout: HDF5, Blosc with Zstandard.
-void writeHdf5(const fs::path& folder, const SyntheticWindow& made) {
-  const auto writer = openHdf5Writer(folder, {{made.rig.cameras.front()}});
-  writer->addEvents(0, made.events.front());
-  writer->addPose({1'000'000'000, {}});
-  writer->close();
-}
-#endif
 
 /// Imports a text folder into a rawlog.
 void writeRawlog(const fs::path& file, const fs::path& folder) {
@@ -253,9 +240,6 @@ void addReading(const Sensors& sensors) {
   add_raw("EVT 2.0", "2.0", EvtEncoding::kEvt2, false);
   add_raw("EVT 3.0", "3.0", EvtEncoding::kEvt3, false);
   add_raw("EVT 3.0, runs of 8 pixels", "3.0", EvtEncoding::kEvt3, true);
-#ifdef EFM_WITH_HDF5
-  add_decoding("HDF5, Blosc", file("hdf5", [=](const fs::path& path) { writeHdf5(path, us()); }));
-#endif
 }
 
 }  // namespace efm::bench

@@ -145,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "evimo2/left_camera/sfm/eval/scene_00 "
                  "evimo2/right_camera/sfm/eval/scene_00",
                  "calibration poses"},
-        Recorded{"numpy", "numpy/metavision/cam0.npy numpy/deflated/cam1.npz", "calibration poses"},
+        Recorded{"numpy", "numpy/metavision/cam0.npy numpy/fields/cam1.npy", "calibration poses"},
         Recorded{"e2vid", "hdf5/e2vid/left.h5 hdf5/e2vid/right.h5", "calibration poses"},
         Recorded{"dsec", "hdf5/dsec", "calibration poses"},
         Recorded{"tum_vie", "hdf5/tum_vie", "calibration poses"},

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "plugin/recordings/columns/npy_array.h"
@@ -17,20 +18,19 @@ namespace efm {
 /// is not certain.
 std::unique_ptr<EventStream> openArrayEvents(EventTable table, const ReaderOptions& options);
 
-/// Events in NumPy arrays, a file per camera:
-///   .npy    N x 4 or 4 x N numbers, whose order is found from the values, as for text;
-///           or a structured array with the fields t, x, y and p; Metavision's is in microseconds
-///   .npz    t, x, y and p, an array of N numbers each; or one array as in a .npy file
-/// Fields and arrays are found by the names that text columns have (xs, timestamps_us, polarity …),
-/// or by the names in `--event-columns "t=NAME x=NAME y=NAME p=NAME"`. Others are ignored.
+/// Events in NumPy arrays (.npy), a file per camera: a structured array with the fields x, y, p and
+/// t, as Metavision's software saves it (then t is in microseconds). `ef.events` in Python makes
+/// such an array of others.
 
-/// An archive may also have K (3 x 3) and D (k1 k2 p1 p2 k3), the calibration of its camera.
-
-/// Reads a radtan lens from K and D of an archive, without the sensor's size.
+/// Reads a radtan lens from K (3 x 3) and D (k1 k2 p1 p2 k3) of an archive, without the sensor's
+/// size.
 CameraModel lensIn(const std::filesystem::path& archive);
 
 /// Returns whether a file is a NumPy array, also compressed, or an archive of arrays. Never throws.
 bool looksLikeNumpy(const std::filesystem::path& file);
+
+/// Returns names and shapes of a file's arrays, for errors: "t (100), x (100)".
+std::string arraysIn(const std::filesystem::path& file);
 
 /// @throws std::runtime_error naming the file, its content and the expected content.
 RecordingParts openEventArrays(const std::vector<std::filesystem::path>& files,

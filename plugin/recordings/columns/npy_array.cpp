@@ -30,8 +30,7 @@ NpyHeader readNpyHeader(const std::filesystem::path& file, const std::string& me
   return parseHeader(firstContentOf(file, kHeaderBytes, member), nameOf(file, member));
 }
 
-NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member,
-                   const NpyPart& part)
+NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member)
     : content_(file, member), name_(nameOf(file, member)) {
   ahead_.resize(kHeaderBytes);
   ahead_.resize(content_.read(ahead_.data(), kHeaderBytes));
@@ -43,63 +42,32 @@ NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member,
         fmt::format("{}: {} bytes follow the array's header: expected {} for {} numbers", name_,
                     file_bytes - header_.data_begin, header_.bytes(), header_.count()));
   }
-  setColumns(part);
+  setColumns();
 }
 
-void NpyArray::setColumns(const NpyPart& part) {
+void NpyArray::setColumns() {
   begin_ = header_.data_begin;
   row_bytes_ = header_.element_bytes;
-  size_ = 1;
-  const std::vector<std::uint64_t>& shape = header_.shape;
-  const NpyField number = {"", header_.type, header_.big_endian, 0};
-  if (part.fields && header_.structured) {
+  if (header_.structured) {
     size_ = header_.count();
     columns_ = header_.fields;
     return;
   }
-  if (part.line && !header_.structured && shape.size() == 2) {
-    size_ = header_.fortran_order ? shape[0] : shape[1];
-    columns_ = {number};
-    begin_ += *part.line * size_ * row_bytes_;
-    if (*part.line > 0) skip(begin_ - header_.data_begin);
-    return;
+  try {
+    requirePlainRows(header_);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", name_, error.what()));
   }
-  const bool transposed = part.transposed && header_.fortran_order && shape.size() == 2;
-  if (!transposed) {
-    try {
-      requirePlainRows(header_);
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(fmt::format("{}: {}", name_, error.what()));
-    }
-  }
-  if (!shape.empty()) size_ = transposed ? shape[1] : shape[0];
+  size_ = header_.shape.empty() ? 1 : header_.shape[0];
   constexpr std::uint64_t kMaxColumns = 1024;
   const std::uint64_t columns = size_ == 0 ? 0 : header_.count() / size_;
   if (columns > kMaxColumns) {
     throw std::runtime_error(
         fmt::format("{}: {} numbers a row: expected at most {}", name_, columns, kMaxColumns));
   }
-  columns_.assign(static_cast<std::size_t>(columns), number);
+  columns_.assign(static_cast<std::size_t>(columns), {"", header_.type, header_.big_endian, 0});
   for (std::size_t k = 0; k < columns_.size(); ++k) columns_[k].offset = k * header_.element_bytes;
   row_bytes_ = columns_.size() * header_.element_bytes;
-}
-
-void NpyArray::skip(std::uint64_t bytes) {
-  if (content_.seekableBytes() > 0) {
-    content_.seek(header_.data_begin + bytes);
-    ahead_.clear();
-    return;
-  }
-  const auto from_ahead = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, ahead_.size()));
-  ahead_.erase(0, from_ahead);
-  bytes -= from_ahead;
-  std::string skipped(kHeaderBytes, '\0');
-  while (bytes > 0) {
-    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, skipped.size()));
-    const std::size_t got = content_.read(skipped.data(), count);
-    bytes -= got;
-    if (got < count) throw failAt(0, fmt::format("the file ends: expected {} rows", size_));
-  }
 }
 
 /// Reads few rows after a jump, which may be a step of a bisection.

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,25 +17,13 @@ namespace efm {
 /// Reads the header of an array in a file of its own, or in a member of a .npz file.
 NpyHeader readNpyHeader(const std::filesystem::path& file, const std::string& member = {});
 
-/// The part of an array that is read.
-struct NpyPart {
-  /// True if the columns are the fields of a structured array (`NpyHeader::fields`).
-  bool fields = false;
-  /// Index of the only column to read, if a matrix stores column after column: N x 4 in Fortran
-  /// order, or 4 x N in C order.
-  std::optional<std::size_t> line;
-  /// True if a matrix in Fortran order is read as its transpose, which is stored row after row.
-  bool transposed = false;
-};
-
 /// The numbers of a NumPy array in a file of its own (.npy) or in a member of an archive (.npz). A
 /// member is read from front to back. Memory holds one block.
 class NpyArray : public NumberRows {
  public:
   /// @param member name in a .npz file, with ".npy"; empty: the file is the array.
-  /// @param part default: all numbers of an array in C order.
-  explicit NpyArray(const std::filesystem::path& file, const std::string& member = {},
-                    const NpyPart& part = {});
+  /// @throws std::runtime_error for arrays that are not stored row after row.
+  explicit NpyArray(const std::filesystem::path& file, const std::string& member = {});
 
   const NpyHeader& header() const { return header_; }
   /// Numbers per row: the product of all sizes but the first, or the number of fields.
@@ -51,8 +38,7 @@ class NpyArray : public NumberRows {
 
  private:
   RowBlock readBlock(std::uint64_t row) override;
-  void setColumns(const NpyPart& part);
-  void skip(std::uint64_t bytes);
+  void setColumns();
 
   FileContent content_;
   std::string name_;

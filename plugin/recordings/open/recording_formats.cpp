@@ -56,8 +56,8 @@ constexpr UnreadFormat kUnreadFormats[] = {
     {"% "sv, "a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header",
      "the encoding of its events is not known; give the RAW file as it was recorded"},
     {"Event Stream"sv, "an Event Stream file (.es)",
-     "it is not read; save the t, x, y and on that the Python package event_stream reads as a "
-     "NumPy array, and give --time-unit us"},
+     "it is not read; of the arrays t, x, y and on that the Python package event_stream reads, "
+     "np.save('events.npy', ef.events(x, y, on, t)) makes a file that is read"},
     {"#!AER-DAT1"sv, "an AEDAT 1 file", kConvert},
     {"#!AER-DAT2"sv, "an AEDAT 2 file", kConvert},
     {"#!AER-DAT3"sv, "an AEDAT 3 file", kConvert},
@@ -242,7 +242,7 @@ RecordingParts posesOfRecording(const fs::path& file, ReaderOptions options) {
     rejectUnread(file);
     throw std::runtime_error(file.string() +
                              ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
-                             "columns with a header), NumPy arrays, or a recording with poses");
+                             "columns with a header), or a recording with poses");
   }
   options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
@@ -258,9 +258,11 @@ RecordingParts readAnyPoses(const fs::path& file, const ReaderOptions& options) 
   RecordingParts parts;
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
   if (looksLikeNumpy(file)) {
-    parts.poses = readPoseArrays(file, options);
-    requireOneTrajectory(parts.poses, file.string());
-    return parts;
+    throw std::runtime_error(fmt::format(
+        "{}: {}: expected poses as text. Python writes them: import numpy as np, event_fusion as "
+        "ef; z = np.load('{}'); ef.write_poses('poses.txt', (t, T), time_unit='s'), with times t "
+        "in their unit and T_world_rig of shape (n, 4, 4), or (n, 7): tx ty tz qx qy qz qw",
+        file.string(), arraysIn(file), file.string()));
   }
   const std::string start = firstContentOf(file, 4096);
   requireTextLines(start, file.string());
@@ -320,7 +322,7 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"aedat4", "an AEDAT4 file", looksLikeAedat4, openAedat4},
       {"evimo2", "a folder of EVIMO2 (dataset_events_t.npy and others)", looksLikeEvimo2,
        openEvimo2},
-      {"numpy", "events in NumPy arrays (.npy, .npz)", looksLikeNumpy, openEventArrays},
+      {"numpy", "events in NumPy arrays (.npy)", looksLikeNumpy, openEventArrays},
       {"text", "a text file with a line t x y p per event, also compressed",
        [](const fs::path& file) { return looksLikeEventText(file); }, openEventText},
   };

@@ -36,7 +36,6 @@ void requireRawlog(const std::filesystem::path& file);
 
 /// Reads poses T_world_body from a file, whose kind is found by its content:
 ///   text, also compressed   see `readPoseText` (text/)
-///   NumPy arrays            see `readPoseArrays`
 ///   JSON                    see `readPoseFrames`
 ///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
 /// @return at least one pose, in the order of the file; and the reader's warnings and notes.
@@ -45,16 +44,5 @@ RecordingParts readPoseParts(const std::filesystem::path& file, const ReaderOpti
 /// Returns the poses of `readPoseParts`.
 std::vector<StampedPose> readPoses(const std::filesystem::path& file,
                                    const ReaderOptions& options = {});
-
-/// Reads the poses of NumPy arrays:
-///   one array N x 8           t tx ty tz qx qy qz qw
-///   a .npz file with N times  and an array N x 7 (tx ty tz qx qy qz qw) or N x 4 x 4
-///   (T_world_body), or N x 3 positions and N x 4 quaternions, x y z w (w x y z if the name of the
-///   array says wxyz).
-/// If several arrays of a .npz file have these shapes, it reads the arrays that are named t, time,
-/// timestamps … and poses, pose, T_world_body, trajectory. A name may include the unit: t_ns,
-/// timestamps_us. Floating-point times are rounded as in `nanoseconds`.
-std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
-                                        const ReaderOptions& options);
 
 }  // namespace efm

@@ -12,9 +12,8 @@ namespace efm {
 
 /// The error for a line of 12 numbers: KITTI's poses are the first three rows of a matrix.
 inline constexpr const char* kPosesWithoutTimes =
-    "12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or "
-    "a "
-    ".npz file with N times and N x 4 x 4 matrices";
+    "12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz qx qy qz qw; "
+    "Python writes them: ef.write_poses('poses.txt', (times, T_world_rig))";
 
 /// Reads text, also compressed, with a row per pose T_world_body:
 ///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;

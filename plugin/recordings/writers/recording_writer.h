@@ -86,15 +86,4 @@ std::unique_ptr<RecordingWriter> openFolderWriter(const std::filesystem::path& f
 /// @param rig rig whose frame is the poses' frame.
 std::unique_ptr<RecordingWriter> openMcapWriter(const std::filesystem::path& file, const Rig& rig);
 
-/// Writes a folder in DSEC's layout: events/left/events.h5, events/right/events.h5, further cameras
-/// events/cam2/events.h5, …; camchain.yaml; poses.txt (T_world_cam0, TUM). A file has /events/x and
-/// y (uint16), p (uint8), t (uint32, microseconds since /t_offset, the first event) and /ms_to_idx
-/// (uint64: the first event of each millisecond of t). Times that are not whole microseconds, or
-/// over 2^32 microseconds (71 minutes) after the first event, are errors. The function exists only
-/// in builds with HDF5.
-/// @param rig rig whose frame is camera 0's frame.
-/// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
-std::unique_ptr<RecordingWriter> openHdf5Writer(const std::filesystem::path& folder,
-                                                const Rig& rig);
-
 }  // namespace efm

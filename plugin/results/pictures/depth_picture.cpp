@@ -14,7 +14,6 @@ namespace efm {
 namespace {
 
 // Sizes in pixels, for a picture of up to 480 pixels.
-constexpr int kTitleHeight = 24;
 constexpr int kBarHeight = 12;
 constexpr int kBarGap = 6;
 constexpr int kTickHeight = 18;
@@ -27,8 +26,7 @@ double scaleOf(int width) { return std::max(1.0, width / 480.0); }
 cv::Mat1f linearised(const cv::Mat1f& values, AxisScale scale) {
   if (scale == AxisScale::kLinear) return values;
   cv::Mat1f linear;  // a new matrix: the values belong to the caller
-  if (scale == AxisScale::kInverse) cv::divide(1.0, values, linear);
-  if (scale == AxisScale::kLogarithmic) cv::log(values, linear);
+  cv::divide(1.0, values, linear);
   return linear;
 }
 
@@ -113,7 +111,7 @@ cv::Mat3b drawBar(const AxisRange& range, Palette palette, const std::string& un
 
 cv::Mat3b drawValues(const ValuePicture& picture) {
   if (picture.values.empty()) {
-    throw std::invalid_argument("the picture '" + picture.title + "' has no values");
+    throw std::invalid_argument("a picture of values has no values");
   }
   cv::Mat1b none;
   cv::Mat3b image = coloured(levelsOf(picture, none), picture.palette);
@@ -126,13 +124,10 @@ cv::Mat3b drawValues(const ValuePicture& picture) {
   if (times > 1) cv::resize(image, image, {}, times, times, cv::INTER_NEAREST);
   const cv::Mat3b bar = drawBar(picture.range, picture.palette, picture.unit, image.cols);
 
-  const double scale = scaleOf(image.cols);
-  const int top = picture.title.empty() ? 0 : cvRound(scale * kTitleHeight);
-  cv::Mat3b whole(top + image.rows + bar.rows, image.cols, cv::Vec3b(255, 255, 255));
-  writeText(whole, picture.title, {2, top - cvRound(scale * 8)}, scale * kPlotTextScale);
-  image.copyTo(whole(cv::Rect({0, top}, image.size())));
-  cv::rectangle(whole, cv::Rect({0, top}, image.size()), cv::Scalar::all(200));
-  bar.copyTo(whole(cv::Rect({0, top + image.rows}, bar.size())));
+  cv::Mat3b whole(image.rows + bar.rows, image.cols, cv::Vec3b(255, 255, 255));
+  image.copyTo(whole(cv::Rect({}, image.size())));
+  cv::rectangle(whole, cv::Rect({}, image.size()), cv::Scalar::all(200));
+  bar.copyTo(whole(cv::Rect({0, image.rows}, bar.size())));
   return whole;
 }
 
@@ -192,7 +187,7 @@ cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width) {
 }
 
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& planes) {
-  return drawValues({"", map.depth, depthAxis(colourLimits({&map.depth}, planes)), "m",
+  return drawValues({map.depth, depthAxis(colourLimits({&map.depth}, planes)), "m",
                      Palette::kBrightToDark, kMinFigureWidth, lightGrey(map.confidence)});
 }
 
@@ -200,8 +195,7 @@ cv::Mat1b confidenceFigure(const cv::Mat1f& confidence) {
   const double maximum = maximumOf(confidence);
   // The figure has no colours, and one channel is encoded faster than three channels.
   cv::Mat1b grey;
-  cv::extractChannel(drawValues({"",
-                                 confidence,
+  cv::extractChannel(drawValues({confidence,
                                  {0, maximum > 0 ? maximum : 1},
                                  "confidence",
                                  Palette::kWhiteToBlack,

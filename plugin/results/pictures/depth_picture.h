@@ -10,17 +10,16 @@
 
 #include "mapping/depth/depth_map.h"
 #include "mapping/geometry/reference_view.h"
-#include "plugin/results/pictures/curve_plot.h"
 #include "plugin/results/pictures/picture.h"
+#include "plugin/results/pictures/picture_axis.h"
 
 namespace efm {
 
 /// An image of values as colours, with a colour bar.
 struct ValuePicture {
-  std::string title;  ///< Empty: the picture begins with the image.
-  cv::Mat1f values;   ///< NaN: no value.
-  AxisRange range;    ///< Range of the colours. A value outside has the colour of the nearer end.
-  std::string unit;   ///< Unit that is written at the bar.
+  cv::Mat1f values;  ///< NaN: no value.
+  AxisRange range;   ///< Range of the colours. A value outside has the colour of the nearer end.
+  std::string unit;  ///< Unit that is written at the bar.
   Palette palette = Palette::kBlueToRed;
   int min_width = 320;   ///< Pixels. A smaller image is enlarged by a whole factor.
   cv::Mat1b under = {};  ///< Grey levels for pixels without a value. Empty: white.

@@ -8,7 +8,7 @@
 
 #include "mapping/geometry/trajectory.h"
 #include "maps/cloud/map_point.h"
-#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/picture_axis.h"
 
 namespace efm {
 

@@ -15,18 +15,6 @@
 
 namespace efm {
 
-void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture) {
-  if (file.extension() != ".png") {
-    throw std::runtime_error(file.string() + ": expected a name that ends in .png");
-  }
-  writeAtomically(file, [&](const std::filesystem::path& temporary) {
-    std::ofstream stream(temporary, std::ios::binary);
-    stream << encodePng(picture, PngPacking::kRuns);
-    stream.close();
-    if (!stream) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
-}
-
 namespace {
 
 const cv::Scalar kWhite = cv::Scalar::all(255);

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include <filesystem>
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
@@ -12,9 +11,6 @@
 #include "maps/io/point_cloud_file.h"
 
 namespace efm {
-
-/// Writes a picture as PNG. The file appears under its name only when it is complete.
-void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture);
 
 /// Joins pictures from left to right on white, with their tops in line.
 cv::Mat3b sideBySide(const std::vector<cv::Mat3b>& pictures);

@@ -189,10 +189,8 @@ distance m  map within %  outliers %  completeness %    F1 %
 }
 
 TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
-  std::ofstream(folder() / "nan.pcd")
-      << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
-         "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n0 0 0\nnan 0 0\n";
-  const auto evaluation = evaluateCloud(folder() / "nan.pcd", cloud("b.pcd", {1}), {});
+  writePly(folder() / "nan.ply", {{0, 0, 0}, {NAN, 0, 0}});
+  const auto evaluation = evaluateCloud(folder() / "nan.ply", cloud("b.pcd", {1}), {});
   EXPECT_EQ(evaluation.non_finite, 1U);
   EXPECT_EQ(evaluation.errors.accuracy.count, 1U);
   EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 points are not finite"));

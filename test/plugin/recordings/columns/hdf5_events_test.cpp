@@ -21,7 +21,6 @@
 #include "plugin/recordings/columns/hdf5_files.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/time_unit.h"
-#include "plugin/recordings/writers/recording_writer.h"
 #include "test/paths.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
@@ -626,72 +625,6 @@ TEST_F(Hdf5Events, FilesOfAFolderAreInTheOrderOfTheirCameras) {
   fs::remove_all(in / "events/left/deep_events");
   EXPECT_FALSE(looksLikeHdf5(in / "events/left"));
   EXPECT_FALSE(looksLikeHdf5(in / "missing"));
-}
-
-/// Tests the folder that the writer makes.
-class Hdf5WriterTest : public TemporaryFolder {
- protected:
-  fs::path out() const { return folder() / "out"; }
-};
-
-TEST_F(Hdf5WriterTest, TheFolderIsReadBack) {
-  constexpr std::size_t kEvents = 150'000;
-  Rig rig = rigOfTwo();
-  rig.cameras.push_back(rig.cameras[1]);  // a silent camera
-  const auto writer = openHdf5Writer(out(), rig);
-  for (std::size_t camera = 0; camera < 2; ++camera) {
-    const std::vector<Event> events = eventsOf(static_cast<std::uint32_t>(camera), kEvents);
-    writer->addEvents(camera, {events.begin(), events.begin() + 70'001});
-    writer->addEvents(camera, {events.begin() + 70'001, events.end()});
-  }
-  writer->addPose({1'700'000'000'123'456'789, rig.cameras[1].T_rig_cam});
-  EXPECT_FALSE(fs::exists(out())) << "not before it is complete";
-  writer->close();
-
-  EXPECT_EQ(detectFormat(out())->name, "hdf5");
-  const RecordingParts parts = openHdf5({out()}, {});
-  ASSERT_EQ(parts.cameras.size(), 3U);
-  EXPECT_EQ(parts.calibration.value().rig.cameras.size(), 3U);
-  ASSERT_EQ(parts.poses.size(), 1U);
-  EXPECT_EQ(parts.poses[0].t_ns, 1'700'000'000'123'456'789);
-  for (std::uint32_t camera = 0; camera < 2; ++camera) {
-    EXPECT_TRUE(readStream(*parts.cameras[camera]) == eventsOf(camera, kEvents));
-    EXPECT_EQ(parts.cameras[camera]->progress(), 1);
-  }
-  EXPECT_TRUE(readStream(*parts.cameras[2]).empty());
-  EXPECT_THAT(errorOf([&] { openHdf5Writer(out(), rig); }),
-              AllOf(StartsWith(out().string()), HasSubstr("not an empty folder")));
-}
-
-TEST_F(Hdf5WriterTest, ARigWithAnUnknownCameraHasNoCameraChain) {
-  Rig rig = rigOfTwo();
-  rig.cameras[1].model.fx = rig.cameras[1].model.fy = 0;
-  openHdf5Writer(out(), rig)->close();
-  EXPECT_TRUE(fs::exists(out() / "events/right/events.h5"));
-  EXPECT_FALSE(fs::exists(out() / "camchain.yaml"));
-}
-
-TEST_F(Hdf5WriterTest, TheIndexIsTheFirstEventOfEachMillisecond) {
-  const auto writer = openHdf5Writer(out(), {{rigOfTwo().cameras[0]}});
-  std::vector<Event> events;
-  for (const std::int64_t t_us : {7'777, 7'778, 8'777, 8'777, 11'776, 11'777}) {
-    events.push_back({t_us * 1'000, 1, 2, true});
-  }
-  writer->addEvents(0, events);
-  writer->close();
-  const auto file = std::make_shared<const Hdf5File>(out() / "events/left/events.h5");
-  EXPECT_EQ(file->integer("/t_offset"), 7'777);
-  EXPECT_THAT(file->numbers("/ms_to_idx", 5, "of events"), ElementsAre(0, 2, 4, 4, 5));
-}
-
-TEST_F(Hdf5WriterTest, TimesThatTheLayoutCannotHoldAreErrors) {
-  const auto writer = openHdf5Writer(out(), {{rigOfTwo().cameras[0]}});
-  writer->addEvents(0, {{1'000'000'000}});
-  EXPECT_THAT(errorOf([&] { writer->addEvents(0, {{1'000'001'500}}); }),
-              AllOf(HasSubstr("events/left/events.h5: event 1 at 1.000001500 s"),
-                    HasSubstr("whole microseconds")));
-  EXPECT_THAT(errorOf([&] { writer->addEvents(0, {{4'295'968'000'000}}); }),
-              HasSubstr("within 71 minutes"));
 }
 
 }  // namespace

@@ -74,17 +74,17 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
        ":2: '1,2,0': expected 4 fields, x y p t, not 3" + other_columns},
       {"kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n",
        ":1: '1 0 0 0 0 1 0 0 0 0 1 0': expected 4 fields, t x y p, not 12 (12 numbers, as poses of "
-       "KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or a .npz file with N "
-       "times "
-       "and N x 4 x 4 matrices)"},
+       "KITTI have, which have no times: expected t tx ty tz qx qy qz qw; Python writes them: "
+       "ef.write_poses('poses.txt', (times, T_world_rig)))"},
       {"old.raw", "% date 2020-01-01\n% plugin_name hal\n\0\1\2"s,
        ": a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header: the encoding "
        "of "
        "its events is not known; give the RAW file as it was recorded (docs/recordings.md)"},
       {"a.es", "Event Stream\2\0\0\1"s,
-       ": an Event Stream file (.es): it is not read; save the t, x, y and on that the Python "
+       ": an Event Stream file (.es): it is not read; of the arrays t, x, y and on that the Python "
        "package "
-       "event_stream reads as a NumPy array, and give --time-unit us (docs/recordings.md)"},
+       "event_stream reads, np.save('events.npy', ef.events(x, y, on, t)) makes a file that is read "
+       "(docs/recordings.md)"},
       {"bag/metadata.yaml", "rosbag2_bagfile_information:\n  version: 5\n",
        ": the description of a ROS 2 bag: expected its folder, FOLDER (docs/recordings.md)"},
       {"readme", "gain = 5 at 3 of the set\n",

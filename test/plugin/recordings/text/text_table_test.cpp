@@ -426,32 +426,6 @@ TEST_F(PoseTable, DamagedFilesAreReadOrRejected) {
   damage(folder() / "transforms.json", json, 0);
 }
 
-TEST_F(PoseTable, ArraysMayBePositionsAndQuaternions) {
-  std::vector<double> t, p, xyzw, wxyz;
-  for (int i = 0; i < 20; ++i) {
-    const StampedPose pose = poseAt(i);
-    const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
-    t.push_back(1e-9 * static_cast<double>(pose.t_ns));
-    for (int k = 0; k < 3; ++k) p.push_back(pose.T_world_rig.translation[k]);
-    for (const double c : {q.x(), q.y(), q.z(), q.w()}) xyzw.push_back(c);
-    for (const double c : {q.w(), q.x(), q.y(), q.z()}) wxyz.push_back(c);
-  }
-  const std::string times = npyArray("<f8", "(20,)", t);
-  const std::string positions = npyArray("<f8", "(20, 3)", p);
-  writeZip(folder() / "a.npz", {{"timestamps.npy", times},
-                                {"positions.npy", positions},
-                                {"quaternions.npy", npyArray("<f8", "(20, 4)", xyzw)}});
-  expectAll(readPoses(folder() / "a.npz"), "x y z w");
-  writeZip(
-      folder() / "b.npz",
-      {{"t.npy", times}, {"p.npy", positions}, {"q_wxyz.npy", npyArray("<f8", "(20, 4)", wxyz)}});
-  expectAll(readPoses(folder() / "b.npz"), "w x y z");
-  writeZip(folder() / "c.npz",
-           {{"t.npy", times}, {"p.npy", positions}, {"q.npy", npyArray("<f8", "(10, 4)", xyzw)}});
-  EXPECT_THAT(errorOf([&] { readPoses(folder() / "c.npz"); }),
-              HasSubstr("q.npy: 10 rows: expected 20"));
-}
-
 TEST_F(PoseTable, ReadsWrittenPosesExactly) {
   StampedPose pose;
   pose.t_ns = 1'700'000'000'123'456'789;

@@ -104,8 +104,7 @@ TEST(ColourBar, RunsFromTheColourOfItsLowEndToThatOfItsHighEnd) {
     EXPECT_LT(cv::norm(first, ends(0, 0)), 12);
     EXPECT_LT(cv::norm(last, ends(0, 1)), 12);
     // The bar has the colours of the image beside it.
-    const cv::Mat3b picture =
-        drawValues({"", (cv::Mat1f(1, 2) << 2, 8), {2, 8}, "m", palette, 320});
+    const cv::Mat3b picture = drawValues({(cv::Mat1f(1, 2) << 2, 8), {2, 8}, "m", palette, 320});
     EXPECT_LT(cv::norm(picture(80, 80), ends(0, 0)), 12);
     EXPECT_LT(cv::norm(picture(80, 240), ends(0, 1)), 12);
   }
