@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Prints how large the project is: C++ lines and files, files under 40 lines, and headers that one file alone includes
-# (beside their own source file), for each folder and in sum. With BIN, also what the built program loads and how long
+# (beside their own source file), for each folder and in sum; Python beside them, and words of docs/. With BIN, also what the built program loads and how long
 # it takes to start.
 #   figures.sh [ROOT [BIN]]      default: this project; BIN is a folder such as build/release/bin
 set -euo pipefail
@@ -38,6 +38,13 @@ for folder in [f for f in folders if f != "test"]:
     row(folder, folders[folder])
 row("source", [p for p in sources if not p.startswith("test/")])
 row("tests", folders["test"])
+for name, tops in (("Python module", ["python"]), ("Python tests", ["test/python", "test/formats"]), ("studies", ["studies"]),
+                   ("studies/public", ["studies/public"])):
+    files = [f for top in tops for f in pathlib.Path(top).glob("**/*.py" if top != "studies" else "*.py")]
+    lines = [f.read_text().count("\n") for f in files]
+    print(f"{name:28} {sum(lines):7} {len(files):6} {sum(n < 40 for n in lines):9}")
+words = {name: sum(len(f.read_text().split()) for f in pathlib.Path(".").glob(name)) for name in ("docs/*.md", "docs/studies/*.md")}
+print(*(f"words of {name}: {count}" for name, count in words.items()), sep="\n")
 PYTHON
 
 if [ -n "$bin" ]; then

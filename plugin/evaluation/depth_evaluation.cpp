@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <limits>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -19,7 +18,6 @@
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/evaluation_text.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
-#include "plugin/results/pictures/depth_picture.h"
 
 namespace efm {
 namespace {

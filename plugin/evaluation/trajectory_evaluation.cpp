@@ -15,7 +15,6 @@
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/evaluation_text.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

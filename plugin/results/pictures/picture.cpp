@@ -6,11 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
-#include <stdexcept>
 
-#include "mapping/base/atomic_file.h"
-#include "mapping/base/picture_file.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
