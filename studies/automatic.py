@@ -114,7 +114,8 @@ def main():
             ])  # fmt: skip
     page.table(["recording", "limits", "planes", "window [s]", "points", "beyond 10 %", "median error"], rows)
     for what, worst in zip(("wrong points are", "the median error is"), np.max(ratios, axis=0)):
-        page.claim(f"{what} at most 1.15 times that by hand", worst <= 1.15, f"worst {worst:.2f}")
+        page.claim(f"{what} at most 1.15 times that by hand", worst <= 1.15, f"worst {worst:.2f}",
+                   "It is the slider: 9 of its 2,069 points are wrong instead of 7.")  # fmt: skip
     page.write()
 
 
