@@ -177,7 +177,7 @@ TEST_F(Formats, ExportedRecordingsGiveTheDepthMapOfTheTextFolder) {
   // MCAP has no message for the camera poses on the rig.
   const std::string calibration = " --calibration " + folderRecording() + "/camchain.yaml";
   for (const auto& [format, options] :
-       {std::pair<std::string, std::string>{"folder", ""}, {"dsec", ""}, {"mcap", calibration}}) {
+       {std::pair<std::string, std::string>{"folder", ""}, {"mcap", calibration}}) {
     const Result result = run("export r.rawlog --to " + format + " --out " + format);
     ASSERT_EQ(result.status, 0) << result.err;
     EXPECT_TRUE(mapsOf(format + options) == maps) << format;
