@@ -29,8 +29,8 @@ def size_of(sizes):
     return round(346 * sizes["scale"]), round(260 * sizes["scale"])
 
 
-def milliseconds(sizes, rule="harmonic"):
-    """Return the processor time of a keyframe in one thread: the least of some runs; random events, 1 s, 0.5 m of travel."""
+def prepared(sizes, rule="harmonic"):
+    """Return what maps a number of windows of random events, 1 s and 0.5 m of travel, in one thread: processor seconds."""
     (width, height), random = size_of(sizes), np.random.default_rng(1)
     K = np.array([[0.65 * width, 0, width / 2], [0, 0.65 * width, height / 2], [0, 0, 1]])
     cameras, events = [], []
@@ -51,8 +51,14 @@ def milliseconds(sizes, rule="harmonic"):
         ef.keyframes(cameras, events, (times, poses), [(0, 10**9)] * windows, options)
         return process_time() - began
 
-    more = pick(4, 1)  # the time of further keyframes has no reading of arrays
-    return min(1e3 * (seconds(1 + more) - seconds(1)) / more for _ in range(pick(3, 1)))
+    return seconds
+
+
+def milliseconds(cases):
+    """Return the time of a keyframe of each case, without the reading of arrays: the least of rounds over all cases."""
+    few, many = pick((1, 5), (1, 2))
+    least = np.min([[[case(few), case(many)] for case in cases] for _ in range(pick(6, 1))], axis=0)
+    return list(1e3 * (least[:, 1] - least[:, 0]) / (many - few))
 
 
 def terms(sizes):
@@ -75,7 +81,7 @@ def fitted(samples, measured):
 
 page = Page("runtime", "8. Runtime and complexity")
 samples = [("", USUAL)] + [(name, {**USUAL, name: value}) for name, values in VARIED.items() for value in values]
-measured = [milliseconds(sizes) for _, sizes in samples]
+measured = milliseconds([prepared(sizes) for _, sizes in samples])
 costs = fitted([sizes for _, sizes in samples], measured)
 formula = [1e-6 * float(np.dot(costs, terms(sizes))) for _, sizes in samples]
 
@@ -107,7 +113,7 @@ page.claim("two cameras take 1.8 to 2.3 times the time of one", 1.8 <= measured[
            f"{fixed:.0f} ms of a keyframe of two cameras depend neither on the planes nor, mostly, on the cameras.")  # fmt: skip
 share = costs[0] * terms(USUAL)[0] / np.dot(costs, terms(USUAL))
 page.claim("DSI creation takes longest", share > 0.5, f"{share:.0%} of Alg. 1")
-by_rule = {rule: milliseconds(USUAL, rule) for rule in RULES}
+by_rule = dict(zip(RULES, milliseconds([prepared(USUAL, rule) for rule in RULES])))
 slowest = max(by_rule.values()) / min(by_rule.values())
 page.claim("the slowest function of fusion takes at most 1.25 times the fastest", slowest <= 1.25,
            f"{slowest:.2f}; " + ", ".join(f"{rule} {ms:.0f} ms" for rule, ms in by_rule.items()))  # fmt: skip
