@@ -100,8 +100,7 @@ ArraysOfFile arraysOf(const fs::path& file) {
 }
 
 EventTable eventColumnsOf(const fs::path& file) {
-  if (beginsWith(file, "PK")) reject(file, arraysOf(file));
-  if (!readNpyHeader(file).structured) reject(file, arraysOf(file));
+  if (beginsWith(file, "PK") || !readNpyHeader(file).structured) reject(file, arraysOf(file));
   const auto array = std::make_shared<NpyArray>(file);
   const std::vector<NpyField>& fields = array->header().fields;
   EventTable table;

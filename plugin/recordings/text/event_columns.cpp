@@ -97,6 +97,37 @@ struct EventText {
   }
 };
 
+/// Returns the order of columns without names, a letter each. It is the order of `--event-columns`
+/// if given, else t x y p or the order that the values show, with a warning.
+/// @throws std::runtime_error if the option is wrong or contradicts the values, or if the order is
+/// likely but not certain.
+std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
+                            const std::string& file, std::vector<Warning>& warnings) {
+  if (!options.columns.empty()) {
+    const std::string order = orderOfOption(options.columns);
+    const std::optional<ColumnOrder> found = orderOfValues(rows, order);
+    if (!found || !found->certain || found->order == order) return order;
+    throw std::runtime_error(
+        fmt::format("--event-columns {}: the columns of {} are {} by their values",
+                    inQuotes(options.columns), file, asWords(found->order)));
+  }
+  const std::string usual = EventColumns().order;
+  const std::optional<ColumnOrder> found = orderOfValues(rows, usual);
+  if (!found || found->order == usual) return usual;
+  const std::string words = asWords(found->order);
+  if (!found->certain) {
+    throw std::runtime_error(
+        fmt::format("{}: by their values, the columns are probably {}: expected {}, a header with "
+                    "their names, or --event-columns \"{}\"",
+                    file, words, asWords(usual), words));
+  }
+  warnings.push_back(
+      {"event-columns", fmt::format("{}: by their values, the columns are {} (--event-columns "
+                                    "\"{}\")",
+                                    file, words, words)});
+  return found->order;
+}
+
 }  // namespace
 
 std::string orderOfOption(const std::string& text) {
@@ -231,33 +262,6 @@ char eventColumnOf(const HeaderWord& word) {
     if (names.find(name) != std::string_view::npos) return column;
   }
   return '-';
-}
-
-std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
-                            const std::string& file, std::vector<Warning>& warnings) {
-  if (!options.columns.empty()) {
-    const std::string order = orderOfOption(options.columns);
-    const std::optional<ColumnOrder> found = orderOfValues(rows, order);
-    if (!found || !found->certain || found->order == order) return order;
-    throw std::runtime_error(
-        fmt::format("--event-columns {}: the columns of {} are {} by their values",
-                    inQuotes(options.columns), file, asWords(found->order)));
-  }
-  const std::string usual = EventColumns().order;
-  const std::optional<ColumnOrder> found = orderOfValues(rows, usual);
-  if (!found || found->order == usual) return usual;
-  const std::string words = asWords(found->order);
-  if (!found->certain) {
-    throw std::runtime_error(
-        fmt::format("{}: by their values, the columns are probably {}: expected {}, a header with "
-                    "their names, or --event-columns \"{}\"",
-                    file, words, asWords(usual), words));
-  }
-  warnings.push_back(
-      {"event-columns", fmt::format("{}: by their values, the columns are {} (--event-columns "
-                                    "\"{}\")",
-                                    file, words, words)});
-  return found->order;
 }
 
 std::optional<EventNames> eventNamesOf(const std::string& option) {

@@ -77,13 +77,6 @@ inline constexpr const char* kExpectedPolarity =
 /// '-' for an unknown name.
 char eventColumnOf(const HeaderWord& word);
 
-/// Returns the order of columns without names, a letter each. It is the order of `--event-columns`
-/// if given, else t x y p or the order that the values show, with a warning.
-/// @throws std::runtime_error if the option is wrong or contradicts the values, or if the order is
-/// likely but not certain.
-std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
-                            const std::string& file, std::vector<Warning>& warnings);
-
 /// The letters of an event's columns.
 inline constexpr std::string_view kEventColumns = "txyp";
 
