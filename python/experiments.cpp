@@ -31,34 +31,6 @@ namespace {
 
 using Times = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
-/// What is simulated: a preset, or a scene around a trajectory. Cameras and a trajectory that are
-/// given with a preset replace its own.
-struct SimulatedWorld {
-  std::string preset, scene;
-  std::vector<RigCamera> cameras;
-  std::vector<StampedPose> poses;
-  std::optional<std::int64_t> start_ns;
-  std::optional<double> duration_s;
-  std::uint64_t seed = 1;
-};
-
-Simulation simulationOf(const SimulatedWorld& world) {
-  const Rig rig{world.cameras};
-  if (!world.scene.empty()) {
-    return makeTrajectorySimulation({world.scene, world.start_ns, world.duration_s, world.seed},
-                                    world.poses, rig);
-  }
-  Simulation simulation = makeSimulation({world.preset, world.duration_s, world.seed});
-  if (!world.cameras.empty()) simulation.rig = rig;
-  if (world.poses.empty()) return simulation;
-  const Simulation moved = makeTrajectorySimulation(
-      {"room", world.start_ns, world.duration_s, world.seed}, world.poses, simulation.rig);
-  simulation.motion = moved.motion;
-  simulation.start_ns = moved.start_ns;
-  simulation.duration_ns = moved.duration_ns;
-  return simulation;
-}
-
 SimulationRun runWith(const OnProgress& on_progress) {
   SimulationRun run;
   run.progress = [calls = ProgressCalls(on_progress)](double fraction) mutable {
@@ -224,24 +196,17 @@ py::tuple perturbed(const Times& times_ns, const Array& T_world_rig,
 
 void defineExperiments(py::module_& module) {
   py::class_<Simulation>(module, "Simulation")
-      .def(py::init([](std::string preset, std::string scene, std::vector<RigCamera> cameras,
-                       const Times& times_ns, const Array& T_world_cam0,
-                       std::optional<std::int64_t> start_ns, std::optional<double> duration_s,
-                       std::uint64_t seed) {
-        return simulationOf({std::move(preset), std::move(scene), std::move(cameras),
-                             stampedPoses(times_ns, T_world_cam0), start_ns, duration_s, seed});
+      .def(py::init([](const std::string& preset, const std::string& scene,
+                       const std::vector<RigCamera>& cameras, const Times& times_ns,
+                       const Array& T_world_cam0, std::optional<std::int64_t> start_ns,
+                       std::optional<double> duration_s, std::uint64_t seed,
+                       std::optional<double> threshold, double mismatch, double refractory_us,
+                       double noise_hz, double hot_fraction, double hot_hz) {
+        return makeSimulation({preset, duration_s, seed, scene,
+                               stampedPoses(times_ns, T_world_cam0), cameras, start_ns, threshold,
+                               threshold, mismatch, refractory_us,
+                               EventNoiseOptions{noise_hz, hot_fraction, hot_hz}});
       }))
-      .def("set_pixels",
-           [](Simulation& simulation, std::optional<double> threshold, double mismatch,
-              double refractory_us, double noise_hz, double hot_fraction, double hot_hz) {
-             EventPixelOptions& pixels = simulation.pixels;
-             if (threshold) pixels.threshold_on = pixels.threshold_off = *threshold;
-             pixels.mismatch = mismatch;
-             pixels.refractory_ns = durationFromSeconds(refractory_us * 1e-6);
-             simulation.noise = {noise_hz, hot_fraction, hot_hz};
-             pixels.validate();
-             simulation.noise.validate();
-           })
       .def_property_readonly("cameras", [](const Simulation& s) { return s.rig.cameras; })
       .def_property_readonly("start_ns", [](const Simulation& s) { return s.start_ns; })
       .def_property_readonly("end_ns", &Simulation::endNs)

@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Compares the results of two builds: the files that they write, their exit statuses, and what they print. What
 # depends on time or memory alone is left out. Exit status 1 if anything differs.
-#   same_results.sh OLD_BIN NEW_BIN      each a folder such as build/release/bin, with ../lib beside it
+#   same_results.sh [--quick] OLD_BIN NEW_BIN      each a folder such as build/release/bin, with ../lib beside it
+# --quick runs the desk and four formats: some minutes instead of an hour.
 # Pictures are compared by their pixels. A job that fails in both builds is named, too: what it should have made was
 # not compared.
 # The recordings are simulated once, by OLD_BIN: three presets, a piece of the desk in every format (test/formats),
 # and the real slider of ../shared/data if it is there. They are kept in build/same_results/in: remove that folder to
 # make them anew.
 set -euo pipefail
-old=$(realpath "${1:?usage: same_results.sh OLD_BIN NEW_BIN}")
+quick=
+if [ "${1:-}" = --quick ]; then
+  quick='^(version|desk[.](map|live|info|offsets|hand_eye|cameras|rawlog)|csv|mvsec|evt3|mcap) '
+  shift
+fi
+old=$(realpath "${1:?usage: same_results.sh [--quick] OLD_BIN NEW_BIN}")
 new=$(realpath "${2:?usage: same_results.sh OLD_BIN NEW_BIN}")
 root=$(cd "$(dirname "$0")/.." && pwd)
 work="$root/build/same_results"
@@ -58,6 +64,27 @@ jobs_table() {
   echo 'desk.rawlog fusion import $i/desk --out r.rawlog; fusion info r.rawlog; fusion map r.rawlog --out out
     echo "[none]" > host.ini; host host.ini "" r.rawlog saved
     for to in folder mcap; do fusion export r.rawlog --to $to --t1 1.5 --out e_$to; done' | tr '\n' ';'
+  echo
+  # What replaces parts of the rig: by options, in playback and live, of a folder and of a rawlog.
+  echo 'desk.offsets offsets="--set rig.time_offsets_s=0,0.004"
+    fusion map $i/desk --out out $offsets; fusion map $i/desk --out live $offsets --set live.enabled=true
+    fusion depth $i/desk $offsets --t0 +0.5 --duration 0.2 --out depth; fusion info $i/desk $offsets
+    fusion map $i/desk --out refined $offsets --set refinement.enabled=true' | tr '\n' ';'
+  echo
+  echo 'desk.hand_eye echo "T_body_rig: [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, -0.1], [0, 0, 0, 1]]" > hand_eye.yaml
+    fusion map $i/desk --out out --hand-eye hand_eye.yaml; fusion info $i/desk --hand-eye hand_eye.yaml
+    fusion map $i/desk --out set --set rig.hand_eye=hand_eye.yaml --set live.enabled=true
+    fusion import $i/desk --hand-eye hand_eye.yaml --out r.rawlog; fusion map r.rawlog --out of_rawlog
+    fusion map r.rawlog --out of_both --hand-eye hand_eye.yaml
+    fusion map $i/desk --out perturbed --hand-eye hand_eye.yaml --perturb tracker=typical,seed=2' | tr '\n' ';'
+  echo
+  echo 'desk.cameras fusion map $i/desk --out out --set rig.cameras=1; fusion map $i/desk --out live --set rig.cameras=1 --set live.enabled=true
+    fusion map $i/desk --out reference --set rig.cameras=1 --set dsi.reference_camera=0
+    sed "s/resolution: .*/resolution: [346, 260]/; s/intrinsics: \\[\\([0-9.]*\\)/intrinsics: [20\\1/" $i/desk/camchain.yaml > other.yaml
+    fusion map $i/desk --out calibrated --calibration $i/desk/camchain.yaml; fusion map $i/desk --out other --calibration other.yaml
+    fusion map $i/desk --out set --set rig.calibration=other.yaml; fusion info $i/desk --calibration other.yaml
+    fusion map $i/trinocular --out pair --set rig.cameras=0,2 --set dsi.reference_camera=1
+    fusion map $i/desk/cam1/events.txt --poses $i/desk/poses.txt --calibration $i/desk/camchain.yaml --set rig.cameras=1 --out one' | tr '\n' ';'
   echo
   while read -r name needs sources; do
     local arguments='' source
@@ -115,7 +142,7 @@ program "$old" --version > /dev/null
 program "$new" --version > /dev/null
 [ -d "$in" ] || make_recordings
 rm -rf "$work/old" "$work/new"
-jobs_table > "$work/jobs"
+jobs_table | grep -E "${quick:-.}" > "$work/jobs"
 run_jobs "$old" "$work/old" &
 trap 'kill $! 2> /dev/null || true' EXIT
 run_jobs "$new" "$work/new"

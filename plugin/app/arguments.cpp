@@ -19,7 +19,7 @@ namespace efm {
 namespace {
 
 template <typename Holds>
-CLI::Validator numberThat(const Holds& holds, const char* expected) {
+CLI::Validator numberThat(const Holds& holds, const std::string& expected) {
   return {[=](std::string& text) {
             const std::optional<double> number = parseFinite(text);
             if (number && holds(*number)) return std::string();
@@ -141,6 +141,10 @@ CLI::Validator aboveZero() {
 
 CLI::Validator zeroOrMore() {
   return numberThat([](double number) { return number >= 0; }, "a number, 0 or more");
+}
+
+CLI::Validator between(double low, double high, const std::string& range) {
+  return numberThat([=](double number) { return number >= low && number <= high; }, range);
 }
 
 std::string errorText(const CLI::App& app, const CLI::ParseError& error) {

@@ -39,6 +39,8 @@ void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes = 
 CLI::Validator oneOf(const std::vector<std::string>& names);
 CLI::Validator aboveZero();
 CLI::Validator zeroOrMore();
+/// @param range the range in words: "0 to 1 (a share of the pixels)".
+CLI::Validator between(double low, double high, const std::string& range);
 
 /// Returns the error of a wrong command line: one sentence with the words that the user typed.
 /// @param app has parsed the command line.

@@ -15,7 +15,7 @@
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "tracking_stub/sensor/simulated_rig.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm {
 
@@ -119,20 +119,10 @@ int runMap(const MapArguments& arguments);
 int runDepth(const DepthArguments& arguments);
 
 struct SimulateArguments {
-  std::string preset;  ///< Empty: `scene`, `trajectory` and `calibration` are used.
-  std::string scene;
+  SimulationOptions simulation;       ///< Without poses and cameras: with a scene they are read.
   std::filesystem::path trajectory;   ///< See `readPoses`: T_world_cam0.
   std::string time_unit;              ///< Of its times, where the file names none.
   std::filesystem::path calibration;  ///< Kalibr camera chain.
-  std::optional<std::int64_t> start_ns;
-  std::optional<double> duration_s;
-  std::uint64_t seed = 1;
-  // Default: the preset's thresholds, or those of ideal pixels.
-  std::optional<double> threshold_on;
-  std::optional<double> threshold_off;
-  double mismatch = 0;
-  double refractory_us = 0;
-  EventNoiseOptions noise;
   std::filesystem::path out;
   Verbosity verbosity = Verbosity::kNormal;
 };

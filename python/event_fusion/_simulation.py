@@ -79,8 +79,8 @@ class Simulation:
         none = np.empty(0, np.int64), np.empty((0, 4, 4))
         times, poses = none if trajectory is None else read_poses(trajectory)
         cameras = read_cameras(calibration)
-        self._simulation = _engine.Simulation(preset, scene, cameras, times, poses, start, duration, seed)
-        self._simulation.set_pixels(threshold, mismatch, refractory_us, noise_hz, hot_pixels, hot_hz)
+        self._simulation = _engine.Simulation(preset, scene, cameras, times, poses, start, duration, seed,
+                                              threshold, mismatch, refractory_us, noise_hz, hot_pixels, hot_hz)
 
     @property
     def cameras(self) -> list[Camera]:

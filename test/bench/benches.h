@@ -64,5 +64,7 @@ void addFusion(const Sensors& sensors);
 void addGlobalCloud(const Sensors& sensors);
 /// Adds the reading of events from text, a rawlog and the file formats of sensors.
 void addReading(const Sensors& sensors);
+/// Adds the calls of a live host: what ends at the same millisecond, and the newest snapshot.
+void addLive(const Sensors& sensors);
 
 }  // namespace efm::bench

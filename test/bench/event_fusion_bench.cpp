@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   efm::bench::addFusion(sensors);
   efm::bench::addGlobalCloud(sensors);
   efm::bench::addReading(sensors);
+  efm::bench::addLive(sensors);
   benchmark::RunSpecifiedBenchmarks();
   return 0;
 }

@@ -17,7 +17,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-GROUPS = ("voting", "keyframe", "motion", "fusion", "extraction", "global_cloud", "reading", "growth")
+GROUPS = ("voting", "keyframe", "motion", "fusion", "extraction", "global_cloud", "reading", "live", "growth")
 LARGE = re.compile("10000000|growth/.*/(4|8|16)/")  # cases that --quick leaves out
 
 
@@ -124,6 +124,9 @@ def tables(cases):
              ratio((*n[:2], "unfused", n[3]), n) if n[2] != "unfused" else "",
              ratio((*n[:3], "threads:1"), n, "real_ms") if n[3] != "threads:1" else ""]
             for n, c in cases.items() if n[0] == "keyframe"])
+    yield ("Live", ["case", "real_ms", "slowest_ms", "delay_ms", "keyframes", "lost"],
+           [[n[1], *(c[q] for q in ("real_ms", "slowest_ms", "delay_ms", "keyframes", "lost"))]
+            for n, c in cases.items() if n[0] == "live"])
     growths = {}
     for n, c in cases.items():
         if n[0] == "growth":

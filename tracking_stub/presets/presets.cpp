@@ -375,9 +375,27 @@ std::vector<std::string> simulationPresets() {
 }
 
 Simulation makeSimulation(const SimulationOptions& options) {
-  Simulation simulation =
-      makerIn(kPresets, "preset", options.preset, options.duration_s)(options.seed);
-  if (options.duration_s) simulation.duration_ns = durationFromSeconds(*options.duration_s);
+  if (options.duration_s) {
+    requireOption(*options.duration_s >= 0.001 && *options.duration_s <= 600, "duration_s",
+                  *options.duration_s, "0.001 to 600");
+  }
+  Simulation simulation = options.scene.empty()
+                              ? makerIn(kPresets, "preset", options.preset)(options.seed)
+                              : emptyPreset(0, EventPixelOptions{}.threshold_on, options.seed);
+  if (!options.cameras.empty()) simulation.rig.cameras = options.cameras;
+  if (!options.scene.empty() || !options.poses.empty()) {
+    moveAlong(options, simulation);
+  } else if (options.duration_s) {
+    simulation.duration_ns = durationFromSeconds(*options.duration_s);
+  }
+  EventPixelOptions& pixels = simulation.pixels;
+  pixels.threshold_on = options.threshold_on.value_or(pixels.threshold_on);
+  pixels.threshold_off = options.threshold_off.value_or(pixels.threshold_off);
+  pixels.mismatch = options.mismatch;
+  pixels.refractory_ns = durationFromSeconds(options.refractory_us * 1e-6);
+  simulation.noise = options.noise;
+  pixels.validate();
+  simulation.noise.validate();
   return simulation;
 }
 

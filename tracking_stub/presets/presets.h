@@ -40,61 +40,56 @@ inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   return rig;
 }
 
-/// Returns the function whose name is an option's value. Also checks the duration.
+/// Returns the function whose name is an option's value.
 template <typename Make, std::size_t N>
 Make makerIn(const NamedChoice<Make> (&makers)[N], const std::string& option,
-             const std::string& name, const std::optional<double>& duration_s) {
-  const Make maker = [&] {
-    try {
-      return valueIn(makers, name);
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(option + ": " + error.what());
-    }
-  }();
-  if (duration_s) {
-    requireOption(*duration_s >= 0.001 && *duration_s <= 600, "duration_s", *duration_s,
-                  "0.001 to 600");
+             const std::string& name) {
+  try {
+    return valueIn(makers, name);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(option + ": " + error.what());
   }
-  return maker;
 }
 
-/// The presets: simulations that are ready to run. Each preset starts at t = 1 s. README.md has a
-/// table of their cameras, durations and depths.
-
+/// What is simulated: a preset, or a scene around a trajectory. Each preset starts at t = 1 s;
+/// README.md has a table of their cameras, durations and depths.
 struct SimulationOptions {
-  std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
-  /// Duration in seconds, 0.001 to 600. Default: the preset's duration.
+  std::string preset = "desk_stereo";  ///< One of `simulationPresets`; unused with a scene.
+  /// Duration in seconds, 0.001 to 600. Default: the preset's duration; on a trajectory 5, or less
+  /// if it ends earlier.
   std::optional<double> duration_s = std::nullopt;
   /// Seed of all random values: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
-};
-
-std::vector<std::string> simulationPresets();
-
-/// Makes scene, rig and motion of a preset.
-Simulation makeSimulation(const SimulationOptions& options = {});
-
-struct TrajectorySimulationOptions {
-  /// One of `simulationScenes`:
+  /// None, or one of `simulationScenes`, built around the simulated part of the trajectory:
   ///   room    a furnished room; its walls are at least 1.9 m from the path;
   ///   street  a street along the path, for vehicles: see makeStreet;
   ///   poles   thin poles before a wall, in the mean viewing direction.
-  std::string scene = "room";
+  /// The scene's direction down is the mean y axis of the cameras.
+  std::string scene = {};
+  /// T_world_cam0, in any order. They are smoothed (see `smoothTrajectory`), and the smoothed
+  /// trajectory is the truth. With a preset they replace its motion.
+  std::vector<StampedPose> poses = {};
+  /// The rig's frame is the frame of camera 0. With a preset they replace its cameras.
+  std::vector<RigCamera> cameras = {};
   /// Start time in the trajectory's clock. Default: `startOfMotion`.
-  std::optional<std::int64_t> start_ns;
-  /// Duration in seconds, 0.001 to 600. Default: 5, or less if the trajectory ends earlier.
-  std::optional<double> duration_s = std::nullopt;
-  std::uint64_t seed = 1;
+  std::optional<std::int64_t> start_ns = std::nullopt;
+  /// Contrast thresholds of all pixels. Default: the preset's, or those of `EventPixelOptions`.
+  std::optional<double> threshold_on = std::nullopt;
+  std::optional<double> threshold_off = std::nullopt;
+  double mismatch = 0;  ///< See `EventPixelOptions`, also for the next.
+  double refractory_us = 0;
+  EventNoiseOptions noise = {};
 };
 
-/// Returns the names of the scenes that can be built around a trajectory.
+std::vector<std::string> simulationPresets();
 std::vector<std::string> simulationScenes();
 
-/// Moves a rig along a measured trajectory. The trajectory is smoothed (see `smoothTrajectory`),
-/// and the smoothed trajectory is the truth. The scene is built around the simulated part of the
-/// path. The scene's direction down is the mean y axis of the cameras.
-/// @param poses T_world_cam0. The rig's frame is the frame of camera 0.
-Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
-                                    const std::vector<StampedPose>& poses, const Rig& rig);
+/// Moves the cameras of a simulation along the trajectory of the options, through their scene, or
+/// without one through the simulation's own.
+void moveAlong(const SimulationOptions& options, Simulation& simulation);
+
+/// Makes scene, rig and motion.
+/// @throws std::invalid_argument if an option is out of range.
+Simulation makeSimulation(const SimulationOptions& options = {});
 
 }  // namespace efm

@@ -145,19 +145,16 @@ std::vector<std::string> simulationScenes() {
   return names;
 }
 
-Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
-                                    const std::vector<StampedPose>& measured, const Rig& rig) {
+void moveAlong(const SimulationOptions& options, Simulation& simulation) {
   constexpr double kDurationS = 5;
-  const MakeScene make = makerIn(kScenes, "scene", options.scene, options.duration_s);
-  requireOption(measured.size() >= 2, "poses", measured.size(), "at least 2");
-  std::vector<StampedPose> poses = measured;
+  const bool has_scene = !options.scene.empty();
+  const MakeScene make = has_scene ? makerIn(kScenes, "scene", options.scene) : nullptr;
+  requireOption(options.poses.size() >= 2, "poses", options.poses.size(), "at least 2");
+  std::vector<StampedPose> poses = options.poses;
   std::stable_sort(poses.begin(), poses.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
   const std::int64_t last_ns = poses.back().t_ns;
 
-  Simulation simulation;
-  simulation.rig = rig;
-  simulation.seed = options.seed;
   simulation.start_ns = options.start_ns.value_or(startOfMotion(poses));
   requireOption(simulation.start_ns >= poses.front().t_ns && simulation.start_ns < last_ns, "start",
                 formatSeconds(simulation.start_ns),
@@ -171,12 +168,12 @@ Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                 "at most the " + formatSeconds(left_ns) + " s that are left of the trajectory");
   simulation.motion = std::make_shared<SampledMotion>(
       smoothTrajectory(posesAround(poses, simulation.start_ns, simulation.endNs())));
+  if (!has_scene) return;
   if (options.scene == "street") {  // like drive_stereo
     simulation.truth_cell_m = 0.05;
     simulation.max_step_px = 1;
   }
   simulation.scene = make(pathOf(simulation));
-  return simulation;
 }
 
 }  // namespace efm

@@ -185,24 +185,22 @@ std::vector<StampedPose> walk() {
   return poses;
 }
 
-Rig smallRig() {
-  Rig rig;
-  rig.cameras = {test::smallCamera()};
-  return rig;
-}
-
-std::string errorOf(const TrajectorySimulationOptions& options) {
-  return messageOf([&] { makeTrajectorySimulation(options, walk(), smallRig()); });
+SimulationOptions aroundWalk(const std::string& scene = "room") {
+  SimulationOptions options;
+  options.scene = scene;
+  options.poses = walk();
+  options.cameras = {test::smallCamera()};
+  return options;
 }
 
 TEST(TrajectorySimulation, BeginsAtTheStartOfMotionAndLastsFiveSeconds) {
-  TrajectorySimulationOptions options;
-  const Simulation simulation = makeTrajectorySimulation(options, walk(), smallRig());
+  SimulationOptions options = aroundWalk();
+  const Simulation simulation = makeSimulation(options);
   EXPECT_NEAR(static_cast<double>(simulation.start_ns - kStartNs) * 1e-9, 1.75, 0.5);
   EXPECT_EQ(simulation.duration_ns, 5'000'000'000);
   options.start_ns = kStartNs + 4'000'000'000;
   options.duration_s = 0.5;
-  const Simulation chosen = makeTrajectorySimulation(options, walk(), smallRig());
+  const Simulation chosen = makeSimulation(options);
   EXPECT_EQ(chosen.start_ns, options.start_ns);
   EXPECT_EQ(chosen.duration_ns, 500'000'000);
   // The motion follows the trajectory.
@@ -218,10 +216,9 @@ TEST(TrajectorySimulation, ScenesAreUprightAroundThePath) {
   };
   for (const Case& of :
        {Case{"room", 1.2, 0.7, 9, 0}, {"street", 1.6, 2.5, 51, 0.4}, {"poles", 0, 0.8, 5.2, 0}}) {
-    TrajectorySimulationOptions options;
-    options.scene = of.scene;
+    SimulationOptions options = aroundWalk(of.scene);
     options.duration_s = 0.5;
-    const Simulation simulation = makeTrajectorySimulation(options, walk(), smallRig());
+    const Simulation simulation = makeSimulation(options);
     // Down is +z, and ahead +x.
     const Vector3d begin = simulation.motion->poseAt(simulation.start_ns).translation;
     const auto floor = castRay(simulation.scene, begin, {0, 0, 1});
@@ -237,16 +234,16 @@ TEST(TrajectorySimulation, ScenesAreUprightAroundThePath) {
 }
 
 TEST(TrajectorySimulation, ErrorsNameTheOptionAndItsRange) {
-  TrajectorySimulationOptions options;
-  options.scene = "attic";
+  SimulationOptions options = aroundWalk("attic");
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("scene"), HasSubstr("'attic'"), HasSubstr("room")));
-  options = {};
+  options = aroundWalk();
   options.start_ns = kStartNs - 1;
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("start = 4.999999999"), HasSubstr("17.000000000")));
   options.start_ns = kStartNs + 10'000'000'000;
   options.duration_s = 3;
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("duration_s = 3"), HasSubstr("2.000000000")));
-  EXPECT_THROW(makeTrajectorySimulation({}, {}, smallRig()), std::invalid_argument);
+  options.poses.clear();
+  EXPECT_THAT(errorOf(options), HasSubstr("poses = 0: must be at least 2"));
 }
 
 }  // namespace
