@@ -45,8 +45,10 @@ class EventReader {
     {
       const Released released;
       const std::lock_guard<std::mutex> lock(mutex_);
-      while (!damage_ && waiting_.size() < count && readPacket(camera)) checkSignals();
-      if (damage_ && waiting_.empty()) std::rethrow_exception(damage_);
+      while (waiting_.size() < count && readPacket(camera)) checkSignals();
+      if (const std::string damage = recording_->damage();
+          ended_ && waiting_.empty() && !damage.empty())
+        throw std::runtime_error(damage);
       const auto end =
           waiting_.begin() + static_cast<std::ptrdiff_t>(std::min(count, waiting_.size()));
       part.assign(waiting_.begin(), end);
@@ -57,13 +59,9 @@ class EventReader {
 
  private:
   bool readPacket(int camera) {
-    std::optional<Sample> sample;
-    try {
-      sample = recording_->next();
-    } catch (const std::runtime_error&) {
-      damage_ = std::current_exception();
-    }
-    if (!sample) return false;
+    const std::optional<Sample> sample = recording_->read();
+    ended_ = !sample;
+    if (ended_) return false;
     const auto* packet = std::get_if<EventPacket>(&*sample);
     if (packet != nullptr && packet->camera == camera) {
       waiting_.insert(waiting_.end(), packet->events.begin(), packet->events.end());
@@ -74,7 +72,7 @@ class EventReader {
   std::mutex mutex_;  // several threads may take turns
   std::unique_ptr<Recording> recording_;
   std::vector<Event> waiting_;
-  std::exception_ptr damage_;
+  bool ended_ = false;
 };
 
 /// Returns the time of a recording's first event, of any camera.

@@ -147,7 +147,7 @@ py::tuple mapCandidates(const RecordingSource& source, const Options& options, s
 
 std::string infoOf(const RecordingSource& source) {
   RecordingInfo info = readInfo(source, [](double) { checkSignals(); });
-  if (info.error) std::rethrow_exception(info.error);
+  if (!info.error.empty()) throw std::runtime_error(info.error);
   info.warnings = hostTexts(std::move(info.warnings), HostFace::kRecording);
   info.notes = hostTexts(std::move(info.notes), HostFace::kRecording);
   return infoJson(info);

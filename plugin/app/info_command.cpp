@@ -173,7 +173,7 @@ int runInfo(const InfoArguments& arguments) {
   } else if (arguments.verbosity != Verbosity::kQuiet) {
     print(info);
   }
-  if (info.error) std::rethrow_exception(info.error);
+  if (!info.error.empty()) throw std::runtime_error(info.error);
   printWarnings(info.warnings);
   printWarnings(info.notes, "note");
   return arguments.strict && failStrictly(info.warnings) ? kFailedStatus : 0;

@@ -60,16 +60,11 @@ TimeLimits RecordingTimes::resolve(const TimeArguments& times) {
 }
 
 std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take) {
-  while (true) {
-    std::optional<Sample> sample;
-    try {
-      sample = recording.next();
-    } catch (const std::exception& error) {
-      return userMessage(error);
-    }
-    if (!sample) return std::nullopt;
-    take(std::move(*sample));
+  while (std::optional<Sample> sample = recording.read()) take(std::move(*sample));
+  if (const std::string damage = recording.damage(); !damage.empty()) {
+    return userMessage(std::runtime_error(damage));
   }
+  return std::nullopt;
 }
 
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,

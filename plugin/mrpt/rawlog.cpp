@@ -10,10 +10,12 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <any>
 #include <cerrno>
 #include <cstring>
 #include <deque>
 #include <exception>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -88,7 +90,8 @@ using mrpt::obs::CObservationRobotPose;
 /// Reads the observations of a rawlog one by one, including observations in sensory frames.
 class RawlogReader {
  public:
-  /// @param camera see `ReadEventsOf`.
+  static constexpr int kAllCameras = std::numeric_limits<int>::max();
+  /// @param camera whose events are read, see `ReadEventsOf`; or those of all cameras.
   explicit RawlogReader(std::filesystem::path file, int camera = -1)
       : file_(std::move(file)), camera_(camera), stream_(file_) {}
 
@@ -123,7 +126,8 @@ class RawlogReader {
 
  private:
   void readEntry() {
-    const ReadEventsOf events_of(camera_);
+    std::optional<ReadEventsOf> events_of;
+    if (camera_ != kAllCameras) events_of.emplace(camera_);
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
     const mrpt::serialization::CSerializable::Ptr entry = archive.ReadObject();
     if (!entry) throw std::runtime_error("an empty object");
@@ -185,80 +189,207 @@ CObservationEvents::Ptr asPacket(const CObservation::Ptr& observation) {
   return std::dynamic_pointer_cast<CObservationEvents>(observation);
 }
 
+constexpr int kOthers = -1;
+
+/// Returns the stream of an observation: a camera, or the observations that are neither events nor
+/// poses; std::nullopt for a pose.
+std::optional<int> streamOf(const CObservation::Ptr& observation) {
+  if (const auto packet = asPacket(observation)) return packet->camera_index;
+  return poseSourceOf(*observation) ? std::nullopt : std::optional(kOthers);
+}
+
+/// Reads a rawlog once for all of its streams. What belongs to another stream waits for it. A
+/// stream for which too much waits is far behind the others: it reads the rest on its own.
+class RawlogStreams {
+ public:
+  explicit RawlogStreams(const std::filesystem::path& file)
+      : reader_(file, RawlogReader::kAllCameras) {}
+
+  struct Read {
+    CObservation::Ptr observation;
+    std::string position;
+  };
+
+  void open(int stream) { streams_.try_emplace(stream); }
+  void close(int stream) { streams_.erase(stream); }
+  /// Returns the next observation of a stream, or null at the end.
+  /// @throws std::runtime_error at damage, after what was read before it.
+  Read next(int id) {
+    Stream& stream = streams_.at(id);
+    while (stream.waiting.empty() && !stream.is_behind && readOn()) {
+    }
+    if (!stream.waiting.empty()) {
+      Read next = std::move(stream.waiting.front());
+      stream.waiting.pop_front();
+      stream.waiting_events -= eventsIn(next.observation);
+      return next;
+    }
+    if (stream.is_behind) return nextOf(id, stream);
+    if (!damage_.empty()) throw std::runtime_error(damage_);
+    return {};
+  }
+  double progress() const { return reader_.progress(); }
+  const std::filesystem::path& file() const { return reader_.file(); }
+
+ private:
+  struct Stream {
+    std::deque<Read> waiting;
+    std::size_t waiting_events = 0;
+    std::size_t count = 0;  // observations of the stream that were read for all
+    bool is_behind = false;
+    std::unique_ptr<RawlogReader> own;
+  };
+
+  static std::size_t eventsIn(const CObservation::Ptr& observation) {
+    const auto packet = asPacket(observation);
+    return packet ? packet->events.size() : 1;
+  }
+
+  /// Reads one observation. @return false at the end, and at damage.
+  bool readOn() {
+    constexpr std::size_t kMaxWaiting = 1'000'000;  // events: 16 MB
+    if (ended_) return false;
+    CObservation::Ptr observation;
+    try {
+      observation = reader_.next();
+    } catch (const std::runtime_error& error) {
+      damage_ = error.what();
+    }
+    ended_ = !observation;
+    if (ended_) return false;
+    const std::optional<int> id = streamOf(observation);
+    const auto found = id ? streams_.find(*id) : streams_.end();
+    if (found == streams_.end() || found->second.is_behind) return true;
+    Stream& stream = found->second;
+    ++stream.count;
+    stream.waiting_events += eventsIn(observation);
+    stream.is_behind = stream.waiting_events > kMaxWaiting;
+    stream.waiting.push_back({std::move(observation), reader_.position()});
+    return true;
+  }
+
+  /// Returns the next observation of a stream that reads on its own.
+  Read nextOf(int id, Stream& stream) {
+    if (!stream.own) {
+      stream.own = std::make_unique<RawlogReader>(file(), id);
+      for (std::size_t i = 0; i < stream.count; ++i) nextOf(id, stream);
+    }
+    CObservation::Ptr observation = stream.own->next();
+    while (observation && streamOf(observation) != id) observation = stream.own->next();
+    return {observation, stream.own->position()};
+  }
+
+  RawlogReader reader_;
+  std::map<int, Stream> streams_;
+  bool ended_ = false;
+  std::string damage_;
+};
+
 /// Reads the events of one camera.
 class RawlogEvents : public EventStream {
  public:
   /// @param first the camera's first packet, without events.
-  RawlogEvents(const std::filesystem::path& file, CObservationEvents::Ptr first)
-      : reader_(file, first->camera_index), first_(std::move(first)) {}
-
-  bool read(std::vector<Event>& events) override {
-    events.clear();
-    try {
-      while (const CObservation::Ptr observation = reader_.next()) {
-        const auto packet = asPacket(observation);
-        if (!packet || packet->camera_index != first_->camera_index) continue;
-        if (!isSame(calibrationOf(*packet), calibrationOf(*first_))) {
-          throw std::runtime_error(fmt::format(
-              "{}: camera {}: its calibration or its pose on the rig differs from that of its "
-              "first packet",
-              reader_.position(), packet->camera_index));
-        }
-        if (packet->events.empty()) continue;
-        events = std::move(packet->events);
-        return true;
-      }
-    } catch (const std::runtime_error& error) {
-      damage_ = error.what();
-    }
-    return false;
+  RawlogEvents(std::shared_ptr<RawlogStreams> streams, CObservationEvents::Ptr first)
+      : streams_(std::move(streams)), first_(std::move(first)) {
+    streams_->open(first_->camera_index);
   }
-  std::string damage() const override { return damage_; }
-  std::string positionOf(std::size_t /*index*/) const override { return reader_.position(); }
-  std::string name() const override { return reader_.file().string(); }
-  double progress() const override { return reader_.progress(); }
+
+  bool sharesDamage() const override { return true; }
+  std::string positionOf(std::size_t /*index*/) const override { return position_; }
+  std::string name() const override { return streams_->file().string(); }
+  double progress() const override { return streams_->progress(); }
   std::optional<CameraSize> size() const override {
     return CameraSize{first_->camera.width, first_->camera.height};
   }
   std::string label() const override { return first_->sensorLabel; }
   std::shared_ptr<const void> original() const override { return first_; }
 
+ protected:
+  bool decode(std::vector<Event>& events) override {
+    events.clear();
+    while (true) {
+      auto [observation, position] = streams_->next(first_->camera_index);
+      if (!observation) return false;
+      position_ = std::move(position);
+      const auto packet = asPacket(observation);
+      if (!isSame(calibrationOf(*packet), calibrationOf(*first_))) {
+        throw std::runtime_error(
+            fmt::format("{}: camera {}: its calibration or its pose on the rig differs from that "
+                        "of its first packet",
+                        position_, packet->camera_index));
+      }
+      if (packet->events.empty()) continue;
+      events = std::move(packet->events);
+      return true;
+    }
+  }
+
  private:
-  RawlogReader reader_;
+  std::shared_ptr<RawlogStreams> streams_;
   CObservationEvents::Ptr first_;
-  std::string damage_;
+  std::string position_;
 };
 
 /// Reads observations that are neither events nor poses. The streams of events report damage.
 class RawlogOthers : public OtherStream {
  public:
-  explicit RawlogOthers(const std::filesystem::path& file) : reader_(file) {}
+  explicit RawlogOthers(std::shared_ptr<RawlogStreams> streams) : streams_(std::move(streams)) {
+    streams_->open(kOthers);
+  }
+  ~RawlogOthers() override { streams_->close(kOthers); }
+  RawlogOthers(const RawlogOthers&) = delete;
+  RawlogOthers& operator=(const RawlogOthers&) = delete;
 
   std::optional<OtherSample> next() override {
+    CObservation::Ptr observation;
     try {
-      while (CObservation::Ptr observation = reader_.next()) {
-        if (asPacket(observation) || poseSourceOf(*observation)) continue;
-        return OtherSample{observation->GetRuntimeClass()->className,
-                           nanosecondsIfKnown(observation->timestamp), std::move(observation)};
-      }
-    } catch (const std::exception&) {
+      observation = streams_->next(kOthers).observation;
+    } catch (const std::runtime_error&) {
     }
-    return std::nullopt;
+    if (!observation) return std::nullopt;
+    return OtherSample{observation->GetRuntimeClass()->className,
+                       nanosecondsIfKnown(observation->timestamp), std::move(observation)};
   }
 
  private:
-  RawlogReader reader_;
+  std::shared_ptr<RawlogStreams> streams_;
 };
 
-/// Adds a pose. A pose that cannot be used causes an error at the recording's end.
-void addPose(const CObservation::Ptr& observation, const std::string& position,
-             const ReaderOptions& options, RecordingParts& parts) {
+/// What a rawlog has beside its events.
+struct RawlogScan {
+  std::map<int, CObservationEvents::Ptr> cameras;  // the first packet of each, without events
+  std::vector<PoseSample> poses;
+  std::string poses_damage;
+  bool has_others = false;
+};
+
+RawlogScan scanOf(const std::filesystem::path& file, bool keep_originals) {
+  RawlogScan scan;
+  RawlogReader reader(file);
+  // A pose that cannot be used causes an error at the recording's end.
+  const auto add_pose = [&](const CObservation::Ptr& observation) {
+    try {
+      PoseSample& pose = scan.poses.emplace_back(*poseIn(*observation));
+      if (keep_originals) pose.original = observation;
+    } catch (const std::invalid_argument& error) {
+      if (scan.poses_damage.empty()) scan.poses_damage = reader.position() + ": " + error.what();
+    }
+  };
   try {
-    PoseSample& pose = parts.pose_samples.emplace_back(*poseIn(*observation));
-    if (options.keep_originals) pose.original = observation;
-  } catch (const std::invalid_argument& error) {
-    if (parts.poses_damage.empty()) parts.poses_damage = position + ": " + error.what();
+    while (const CObservation::Ptr observation = reader.next()) {
+      if (const auto packet = asPacket(observation)) {
+        scan.cameras.emplace(packet->camera_index, packet);
+      } else if (poseSourceOf(*observation)) {
+        add_pose(observation);
+      } else {
+        scan.has_others = true;
+      }
+    }
+  } catch (const std::runtime_error& error) {
+    if (scan.cameras.empty() && scan.poses.empty() && !scan.has_others) throw;
+    if (scan.cameras.empty()) scan.poses_damage = error.what();
   }
+  return scan;
 }
 
 CObservation::Ptr packetOf(EventPacket packet) {
@@ -395,27 +526,17 @@ std::uint64_t GzStream::getPosition() const {
 }
 
 RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options) {
+  const bool is_scanned = options.scan && options.scan->has_value();
+  RawlogScan scan =
+      is_scanned ? std::any_cast<RawlogScan>(*options.scan) : scanOf(file, options.keep_originals);
+  if (options.scan && !is_scanned) *options.scan = scan;
   RecordingParts parts;
-  std::map<int, CObservationEvents::Ptr> cameras;
-  bool has_others = false;
-  RawlogReader reader(file);
-  try {
-    while (const CObservation::Ptr observation = reader.next()) {
-      if (const auto packet = asPacket(observation)) {
-        cameras.emplace(packet->camera_index, packet);
-      } else if (poseSourceOf(*observation)) {
-        addPose(observation, reader.position(), options, parts);
-      } else {
-        has_others = true;
-      }
-    }
-  } catch (const std::runtime_error& error) {
-    if (cameras.empty() && parts.pose_samples.empty() && !has_others) throw;
-    if (cameras.empty()) parts.poses_damage = error.what();
-  }
+  parts.pose_samples = std::move(scan.poses);
+  parts.poses_damage = std::move(scan.poses_damage);
   Calibration calibration{file, {}};
+  const auto streams = std::make_shared<RawlogStreams>(file);
   bool is_calibrated = false;  // at least one camera; the mapping reports uncalibrated cameras
-  for (const auto& [index, first] : cameras) {
+  for (const auto& [index, first] : scan.cameras) {
     if (index != static_cast<int>(calibration.rig.cameras.size())) {
       throw std::runtime_error(
           fmt::format("{}: the recording has events of camera {} but none of camera {}",
@@ -423,10 +544,10 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
     }
     calibration.rig.cameras.push_back(calibrationOf(*first));
     is_calibrated = is_calibrated || isCalibrated(first->camera);
-    parts.cameras.push_back(std::make_unique<RawlogEvents>(file, first));
+    parts.cameras.push_back(std::make_unique<RawlogEvents>(streams, first));
   }
   if (is_calibrated) parts.calibration = std::move(calibration);
-  if (has_others) parts.others = std::make_unique<RawlogOthers>(file);
+  if (scan.has_others) parts.others = std::make_unique<RawlogOthers>(streams);
   return parts;
 }
 

@@ -45,7 +45,7 @@ class GzStream : public mrpt::io::CStream {
 /// Opens a rawlog, gzip-compressed or plain. Cameras are in the order of their indices. The
 /// movements of actions are composed to poses (see DeadReckoning), which come before the next
 /// frame. If several of these poses have the same time, only the last is kept. Other actions and
-/// comments are ignored. The file is read for poses and cameras, and again for each stream.
+/// comments are ignored. The file is read for poses and cameras, and once more for all streams.
 ///
 /// The error "stopped at entry N of FILE: reason" means a truncated or damaged file, or an unknown
 /// class. Entries are counted from 0, as in MRPT's programs. All entries before N are read.

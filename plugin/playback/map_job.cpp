@@ -46,7 +46,6 @@ RecordingSource MapJob::sourceNow() const {
   now.setup = options.rig.setup;
   if (!options.mapper.cameras.empty()) now.cameras = options.mapper.cameras;
   now.time_offsets_ns = options.rig.time_offsets_ns;
-  now.override_rig = false;  // the mapping applies the options
   PosePerturbationOptions& perturbation = now.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
@@ -63,6 +62,7 @@ std::vector<std::filesystem::path> MapJob::allInputs() const {
 }
 
 void MapJob::prepare() {
+  source.reader.scan = std::make_shared<std::any>();  // a long recording is opened twice
   if (!source.calibration.empty()) options.rig.calibration = source.calibration;
   if (!source.poses.empty()) options.rig.pose_source.clear();  // a single source
   if (!source.hand_eye.empty()) options.rig.hand_eye = source.hand_eye;
@@ -249,18 +249,13 @@ void MapSteps::takeCalibrationOf(std::size_t count) {
 std::unique_ptr<Recording> MapSteps::firstLook() {
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
-  takeCalibrationOf(held->read().rig().cameras.size());
+  Recording& source = held->source();
+  takeCalibrationOf(source.rig().cameras.size());
   FirstLook look(options);
   Progress progress("first look", job.verbosity);
-  std::exception_ptr damage;  // the mapping reports it
-  const auto next = [&]() -> std::optional<Sample> {
+  const auto next = [&] {
     requireNoStop();
-    try {
-      return held->read().next();
-    } catch (const std::exception&) {
-      damage = std::current_exception();
-      return std::nullopt;
-    }
+    return source.read();  // the mapping reports damage
   };
   bool takes = true;  // the mapping reports rejected samples
   std::optional<Sample> sample;
@@ -269,10 +264,10 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
     if (const auto* packet = std::get_if<EventPacket>(&*sample))
       first.statistics.addEvents(*packet);
     held->hold(std::move(*sample));
-    progress.show(held->read().progress());
-    tellProgress("first look", held->read().progress());
+    progress.show(source.progress());
+    tellProgress("first look", source.progress());
   }
-  if (takes) held->end(damage);
+  if (takes) held->end();
   const RecordingSurvey survey = look.finish();
   if (options.automatic.any()) {
     OptionChoice choice = chooseOptions(options.automatic, survey.rig, survey.samples,
@@ -286,16 +281,16 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
     options.cloud.voxel_size_m = choice.voxel_size_m.value_or(options.cloud.voxel_size_m);
     options.automatic = {};
     if (!choice.is_proven) {
-      first.quality.doubts.push_back(choice.found_scene
-                                  ? "the parallax is too small to tell how far the scene is away"
-                                  : "no scene was found to choose depth limits from");
+      first.quality.doubts.push_back(
+          choice.found_scene ? "the parallax is too small to tell how far the scene is away"
+                             : "no scene was found to choose depth limits from");
     }
   }
   PoseVerdict verdict = options.checks ? survey.judgePoses(options.mapper) : PoseVerdict();
   verdict.applyTo(options.mapper);
   append(report.warnings, std::move(verdict.warnings));
   warnOfNew();
-  verdict.notes = held->read().counts().notes;  // the quality says what could not be checked
+  verdict.notes = source.counts().notes;  // the quality says what could not be checked
   for (const Warning& note : verdict.notes) {
     if (job.note) job.note(note.name + ": " + note.text);
   }
@@ -347,7 +342,7 @@ void MapSteps::describe(MappingRun& run, bool stopped) {
   report.faults = job.sourceNow().faults;
   const std::string calibration = options.rig.calibration.string();
   // The recording's own calibration may be the better one. --calibration is intended.
-  if (run.mapper().status().recalibrated_cameras > 0 && job.source.calibration.empty()) {
+  if (recording->counts().recalibrated && job.source.calibration.empty()) {
     report.warnings.push_back({"calibration-replaced",
                                calibration + " replaced another calibration, the recording's own; "
                                              "--set rig.calibration= keeps that"});

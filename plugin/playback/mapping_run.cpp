@@ -73,9 +73,14 @@ bool MappingRun::feedNext() {
   std::optional<Sample> sample;
   {
     const SecondsScope scope(reading_.real.read, reading_.cpu.read);
-    sample = recording_.next();
+    sample = recording_.read();
   }
-  if (!sample) return false;
+  if (!sample) {
+    if (const std::string damage = recording_.damage(); !damage.empty() && !error_) {
+      error_ = userError(std::runtime_error(damage));
+    }
+    return false;
+  }
   if (options_.live.enabled) waitForTimeOf(*sample);
   if (std::holds_alternative<PoseSample>(*sample)) first_.statistics.add(*sample);
   try {
@@ -264,21 +269,17 @@ void HeldRecording::hold(Sample sample) {
   if (bytes_left_ < 0) {
     samples_.clear();
   } else {
-    samples_.push_back({std::move(sample), read_->position()});
+    samples_.push_back({std::move(sample), source_->position()});
   }
 }
 
-void HeldRecording::end(std::exception_ptr error) {
-  error_ = std::move(error);
+void HeldRecording::end() {
   ended_ = true;
   num_samples_ = samples_.size();
 }
 
-std::optional<Sample> HeldRecording::next() {
-  if (samples_.empty()) {
-    if (error_) std::rethrow_exception(error_);
-    return std::nullopt;
-  }
+std::optional<Sample> HeldRecording::read() {
+  if (samples_.empty()) return std::nullopt;
   Held next = std::move(samples_.front());
   samples_.pop_front();
   position_ = std::move(next.position);

@@ -98,33 +98,33 @@ class MappingRun {
 /// their events fit into a given memory.
 class HeldRecording : public Recording {
  public:
-  HeldRecording(std::unique_ptr<Recording> read, double max_mb)
-      : read_(std::move(read)), bytes_left_(max_mb * 1e6) {}
+  HeldRecording(std::unique_ptr<Recording> source, double max_mb)
+      : source_(std::move(source)), bytes_left_(max_mb * 1e6) {}
 
   /// Returns the recording that is being read.
-  Recording& read() { return *read_; }
+  Recording& source() { return *source_; }
   void hold(Sample sample);
-  /// Ends the reading. @param error that ended the recording, or null.
-  void end(std::exception_ptr error);
+  /// Ends the reading.
+  void end();
   /// Returns whether it holds the whole recording.
   bool isWhole() const { return ended_ && bytes_left_ >= 0; }
 
-  std::optional<Sample> next() override;
-  const Rig& rig() const override { return read_->rig(); }
+  std::optional<Sample> read() override;
+  std::string damage() const override { return source_->damage(); }
+  const Rig& rig() const override { return source_->rig(); }
   std::string position() const override { return position_; }
   double progress() const override;
-  RecordingCounts counts() const override { return read_->counts(); }
+  RecordingCounts counts() const override { return source_->counts(); }
 
  private:
   struct Held {
     Sample sample;
     std::string position;
   };
-  std::unique_ptr<Recording> read_;
+  std::unique_ptr<Recording> source_;
   double bytes_left_;
   std::deque<Held> samples_;
   std::size_t num_samples_ = 0;
-  std::exception_ptr error_;
   bool ended_ = false;
   std::string position_;
 };

@@ -76,20 +76,21 @@ RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>
   RecordingInfo info;
   FirstLook look(defaultOptions());
   bool takes = true;  // a recording may lack parts of a map
-  try {
-    while (const std::optional<Sample> sample = recording->next()) {
-      ++info.observations;
-      if (!info.statistics.add(*sample)) ++info.others[std::get<OtherSample>(*sample).type];
-      takes = look.take(*sample);
-      if (progress) progress(recording->progress());
-    }
-    if (!info.statistics.eventSpan()) rejectLimitsWithoutEvents(source.limits, *recording);
-  } catch (const std::exception&) {
-    info.error = std::current_exception();
+  while (const std::optional<Sample> sample = recording->read()) {
+    ++info.observations;
+    if (!info.statistics.add(*sample)) ++info.others[std::get<OtherSample>(*sample).type];
+    takes = look.take(*sample);
+    if (progress) progress(recording->progress());
   }
+  info.error = recording->damage();
   info.counts = recording->counts();
+  const bool limited = source.limits.t0_ns || source.limits.t1_ns;
+  if (info.error.empty() && !info.statistics.eventSpan() && limited &&
+      !recording->rig().cameras.empty()) {
+    info.error = noEventText(source.limits, info.counts);
+  }
   info.true_depth_maps = openTruth(source).size();
-  if (!info.error) judge(takes ? &look : nullptr, info);
+  if (info.error.empty()) judge(takes ? &look : nullptr, info);
   return info;
 }
 

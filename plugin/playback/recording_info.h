@@ -27,8 +27,8 @@ struct RecordingInfo {
   std::vector<Warning> warnings;
   std::vector<Warning> notes;  ///< What could not be checked.
   /// Why the recording was not read to its end, or has no events within its limits. There are
-  /// neither chosen values nor warnings then. Null without error.
-  std::exception_ptr error;
+  /// neither chosen values nor warnings then. Empty without error.
+  std::string error;
 };
 
 /// Reads a recording to its end, or to its damage. Parts of it may be missing.

@@ -476,7 +476,6 @@ SessionStatus MappingSession::status() const {
   status.rig = mapper_.rig();
   status.silent_keyframes.resize(status.rig.cameras.size());
   status.quality.left_out = left_out_.size();
-  status.recalibrated_cameras = rig_.recalibratedCameras();
   if (refinement_) {
     status.refinement = refinement_->state();
     status.times.real.refine = status.refinement->seconds;

@@ -16,13 +16,6 @@
 namespace efm {
 namespace {
 
-/// Returns whether poses are equal, except for the rounding of MRPT's poses.
-bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
-  constexpr double kRounding = 1e-9;
-  const Rigid3 T_b_c = T_a_b.inverse() * T_a_c;
-  return T_b_c.translation.norm() < kRounding && T_b_c.rotation.vec().norm() < kRounding;
-}
-
 OptionName timeOffsets() { return {"rig", "time_offsets_s", " (how many)"}; }
 
 void requireSame(const RigCamera& first, const EventPacket& packet) {
@@ -87,13 +80,7 @@ std::vector<EventPacket> RigAssembly::add(EventPacket packet, FusionMapper& mapp
 void RigAssembly::applyOptions(EventPacket& packet) {
   const auto camera = static_cast<std::size_t>(packet.camera);
   RigCamera& recorded = packet.calibration;
-  if (setup_.calibration) {
-    const RigCamera given = setup_.calibration->camera(camera, knownSize(recorded.model));
-    if (given.model != recorded.model || !areNear(given.T_rig_cam, recorded.T_rig_cam)) {
-      recalibrated_.insert(packet.camera);
-    }
-    recorded = given;
-  }
+  if (setup_.calibration) recorded = setup_.calibration->camera(camera, knownSize(recorded.model));
   if (!isCalibrated(recorded.model)) {
     throw OptionHint(
         fmt::format("camera {} has no calibration: a map needs --calibration FILE ([rig] "

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
@@ -55,8 +54,6 @@ class RigAssembly {
 
   /// Returns the content of the files that the options name.
   const RigSetup& setup() const { return setup_; }
-  /// Returns the number of cameras whose recorded calibration differs from the options'.
-  std::size_t recalibratedCameras() const { return recalibrated_.size(); }
 
  private:
   bool isKnown() const;
@@ -79,7 +76,6 @@ class RigAssembly {
   std::map<int, std::int64_t> announced_ns_;  // end of each camera's empty packets
   int stated_cameras_ = 0;                    // number that a packet has
   std::optional<bool> announced_;  // true if all cameras were announced; set at the first event
-  std::set<int> recalibrated_;
   std::map<int, std::vector<EventPacket>> waiting_;  // by camera
   std::optional<std::int64_t> waiting_since_ns_;     // begin of the first waiting event
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
@@ -102,14 +103,15 @@ struct RecordedTransform {
 
 /// Counts of irregular data in a recording that could be read.
 struct RecordingCounts {
-  std::uint64_t sorted_events = 0;    ///< Events that came up to 10 ms after a newer event.
-  std::uint64_t lost_packets = 0;     ///< Missing packets, from the recording's packet numbers.
-  std::uint64_t undated_events = 0;   ///< Events left out: see `EventStream::undatedEvents`.
-  std::uint64_t skipped_events = 0;   ///< Bad events, left out: see `BadEvents`.
-  std::string first_skipped;          ///< Error of the first skipped event.
-  std::vector<Warning> warnings;      ///< Warnings of the readers: see `EventStream::warnings`.
-  std::vector<Warning> notes;         ///< Notes of the readers, for example of replaced transforms.
-  std::vector<RecordedTopic> topics;  ///< Topics of a bag, if they were asked for.
+  std::uint64_t sorted_events = 0;   ///< Events that came up to 10 ms after a newer event.
+  std::uint64_t lost_packets = 0;    ///< Missing packets, from the recording's packet numbers.
+  std::uint64_t undated_events = 0;  ///< Events left out: see `EventStream::undatedEvents`.
+  std::uint64_t skipped_events = 0;  ///< Bad events, left out: see `BadEvents`.
+  std::string first_skipped;         ///< Error of the first skipped event.
+  std::vector<Warning> warnings;     ///< Warnings of the readers: see `EventStream::warnings`.
+  std::vector<Warning> notes;        ///< Notes of the readers, for example of replaced transforms.
+  bool recalibrated = false;  ///< A given calibration replaced another one, the recording's own.
+  std::vector<RecordedTopic> topics;          ///< Topics of a bag, if they were asked for.
   std::vector<RecordedTransform> transforms;  ///< As `topics`.
   /// Times of the events nearest to the time limits of reading, on the clock of the poses.
   std::optional<std::int64_t> nearest_before_ns, nearest_after_ns;
@@ -122,7 +124,18 @@ class Recording {
   virtual ~Recording() = default;
 
   /// @return the next sample; std::nullopt at the end.
-  virtual std::optional<Sample> next() = 0;
+  /// @throws std::runtime_error once at damage, after the samples before it.
+  std::optional<Sample> next() {
+    std::optional<Sample> sample = read();
+    const std::string damage = sample || thrown_ ? std::string() : this->damage();
+    if (damage.empty()) return sample;
+    thrown_ = true;
+    throw std::runtime_error(damage);
+  }
+  /// @return the next sample; std::nullopt at the end, and at damage.
+  virtual std::optional<Sample> read() = 0;
+  /// Returns the damage that ended the recording; empty if there is none.
+  virtual std::string damage() const { return {}; }
 
   /// Returns the cameras, as in the packets.
   virtual const Rig& rig() const = 0;
@@ -134,6 +147,9 @@ class Recording {
   virtual double progress() const = 0;
 
   virtual RecordingCounts counts() const { return {}; }
+
+ private:
+  bool thrown_ = false;
 };
 
 }  // namespace efm

@@ -152,11 +152,10 @@ struct SessionStatus {
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.
   std::map<PoseSourceId, std::uint64_t> other_poses;  ///< Unused poses of other sources.
   std::vector<std::uint64_t> silent_keyframes;        ///< Keyframes without events, per camera.
-  Rig rig;                               ///< The cameras so far, with the options' overrides.
-  std::size_t recalibrated_cameras = 0;  ///< Cameras whose recorded calibration differs.
-  std::vector<ChosenOption> chosen;      ///< Automatic options, with their reasons.
-  std::uint64_t choices = 0;             ///< Number of times that options were chosen.
-  bool scene_unknown = false;            ///< True if the last choice found no scene: it is a guess.
+  Rig rig;                           ///< The cameras so far, with the options' overrides.
+  std::vector<ChosenOption> chosen;  ///< Automatic options, with their reasons.
+  std::uint64_t choices = 0;         ///< Number of times that options were chosen.
+  bool scene_unknown = false;        ///< True if the last choice found no scene: it is a guess.
   /// Playback with automatic options: the poses do not explain the events of the first look.
   std::vector<Warning> pose_warnings;
   std::vector<Warning> pose_notes;            ///< What the first look could not check.

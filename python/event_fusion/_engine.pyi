@@ -162,9 +162,6 @@ class Simulation:
         start_ns: Optional[int],
         duration_s: Optional[float],
         seed: int,
-    ) -> None: ...
-    def set_pixels(
-        self,
         threshold: Optional[float],
         mismatch: float,
         refractory_us: float,

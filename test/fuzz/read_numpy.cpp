@@ -62,6 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     camera->seek(1'000'000'000);
     std::vector<efm::Event> events;
     for (int blocks = 0; blocks < 4 && camera->read(events); ++blocks) camera->positionOf(0);
+    if (!camera->damage().empty()) throw std::runtime_error(camera->damage());
   });
   return 0;
 }

@@ -50,6 +50,7 @@ inline std::int64_t readStream(EventStream& stream) {
     // A block without events also takes time.
     count += events.size() + 1;
   }
+  if (!stream.damage().empty()) throw std::runtime_error(stream.damage());
   return middle_ns;
 }
 

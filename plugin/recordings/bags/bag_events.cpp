@@ -183,7 +183,7 @@ class BagEvents : public EventStream {
     }
   }
 
-  bool read(std::vector<Event>& events) override {
+  bool decode(std::vector<Event>& events) override {
     events.clear();
     places_.clear();
     BagMessage message;

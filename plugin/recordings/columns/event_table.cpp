@@ -29,7 +29,7 @@ class TableEvents : public EventStream {
     if (!table_.time_unit_ns) findUnit(options);
   }
 
-  bool read(std::vector<Event>& events) override {
+  bool decode(std::vector<Event>& events) override {
     constexpr std::size_t kBlockEvents = 65'536;
     events.clear();
     first_ = next_;

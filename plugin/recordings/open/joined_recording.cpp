@@ -2,7 +2,6 @@
 #include "plugin/recordings/open/joined_recording.h"
 
 #include <algorithm>
-#include <exception>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -46,18 +45,22 @@ class JoinedRecording : public Recording {
     requireOption(parts_.cameras.size() == parts_.rig.cameras.size(), "event streams",
                   parts_.cameras.size(), "one per camera");
     for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {
-      const std::int64_t offset_ns = parts_.offsets_ns[i];
+      const std::int64_t offset_ns = offsetOf(i);
       parts_.cameras[i].skipBadEvents(*bad_);
       if (limits.t0_ns) parts_.cameras[i].startAt(*limits.t0_ns - offset_ns);
       if (limits.t1_ns) parts_.cameras[i].stopAt(*limits.t1_ns - offset_ns);
     }
     std::stable_sort(parts_.poses.begin(), parts_.poses.end(),
                      [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+    for (std::size_t i = 0; i < parts_.cameras.size() && !parts_.poses.empty(); ++i) {
+      parts_.cameras[i].expectPoses(parts_.poses.front().t_ns - offsetOf(i),
+                                    parts_.poses.back().t_ns - offsetOf(i));
+    }
     if (!parts_.all_poses) cutPoses(limits, parts_.poses);
     if (!limits.t0_ns && !limits.t1_ns) requireEvents();
   }
 
-  std::optional<Sample> next() override {
+  std::optional<Sample> read() override {
     readAhead();
     if (next_pose_ < parts_.poses.size()) {
       PoseSample& pose = parts_.poses[next_pose_];
@@ -70,13 +73,18 @@ class JoinedRecording : public Recording {
     if (other_ && (!other_->t_ns || isDue(*other_->t_ns))) {
       return *std::exchange(other_, std::nullopt);
     }
-    if (error_) std::rethrow_exception(error_);
-    if (!packet_) {
-      if (const std::string error = damage(); !error.empty()) throw std::runtime_error(error);
-      return std::nullopt;
-    }
+    if (!packet_) return std::nullopt;
     position_ = packet_position_;
     return *std::exchange(packet_, std::nullopt);
+  }
+
+  /// Damage at which the recording ended comes first.
+  std::string damage() const override {
+    std::string damage = damaged_ ? parts_.cameras[*damaged_].damage() : parts_.poses_damage;
+    for (const EventPackets& camera : parts_.cameras) {
+      if (damage.empty()) damage = camera.stream().damage();
+    }
+    return damage;
   }
 
   const Rig& rig() const override { return parts_.rig; }
@@ -94,6 +102,7 @@ class JoinedRecording : public Recording {
     RecordingCounts counts;
     counts.warnings = parts_.warnings;
     counts.notes = parts_.notes;
+    counts.recalibrated = parts_.recalibrated;
     counts.topics = parts_.topics;
     counts.transforms = parts_.transforms;
     counts.skipped_events = bad_->count();
@@ -101,12 +110,12 @@ class JoinedRecording : public Recording {
     for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {
       const EventPackets& camera = parts_.cameras[i];
       if (const auto t_ns = camera.nearestBefore()) {
-        const std::int64_t before_ns = *t_ns + parts_.offsets_ns[i];
+        const std::int64_t before_ns = *t_ns + offsetOf(i);
         counts.nearest_before_ns =
             std::max(counts.nearest_before_ns.value_or(before_ns), before_ns);
       }
       if (const auto t_ns = camera.nearestAfter()) {
-        const std::int64_t after_ns = *t_ns + parts_.offsets_ns[i];
+        const std::int64_t after_ns = *t_ns + offsetOf(i);
         counts.nearest_after_ns = std::min(counts.nearest_after_ns.value_or(after_ns), after_ns);
       }
       counts.sorted_events += camera.sortedEvents();
@@ -120,23 +129,23 @@ class JoinedRecording : public Recording {
   }
 
  private:
+  /// Returns the offset from a camera's clock to the clock of the poses.
+  std::int64_t offsetOf(std::size_t camera) const {
+    return parts_.rig.cameras[camera].time_offset_ns;
+  }
+
   void requireEvents() {
-    if (parts_.cameras.empty() || nextCamera()) return;
+    if (parts_.cameras.empty()) return;
+    const std::optional<std::size_t> first = nextCamera();
+    if (first && parts_.cameras[*first].isAtDamage()) {
+      throw std::runtime_error(parts_.cameras[*first].damage());
+    }
+    if (first || !damage().empty()) return;  // the recording ends with damage
     std::string names;
     for (const EventPackets& camera : parts_.cameras) {
       names += (names.empty() ? "" : ", ") + camera.stream().name();
     }
-    if (!damage().empty()) return;  // the error comes after the poses
     throw std::runtime_error(names + ": no events: expected at least one");
-  }
-
-  /// Returns the error of damage; empty if there is none so far.
-  std::string damage() const {
-    std::string damage = parts_.poses_damage;
-    for (const EventPackets& camera : parts_.cameras) {
-      if (damage.empty()) damage = camera.stream().damage();
-    }
-    return damage;
   }
 
   /// Returns whether there is no next packet, or it does not begin before this time.
@@ -144,17 +153,13 @@ class JoinedRecording : public Recording {
     return !packet_ || nearestTick(t_ns) <= nearestTick(*packet_->t_ns);
   }
 
-  /// Reads the next packet and object. An error of the events comes after all poses.
+  /// Reads the next packet and object. After damage of the events, only poses come.
   void readAhead() {
-    try {
-      if (!packet_ && !error_) packet_ = nextPacket();
-      while (parts_.others && !other_ && !error_) {
-        other_ = parts_.others->next();
-        if (!other_) parts_.others.reset();
-        if (other_ && other_->t_ns && !limits_.contain(*other_->t_ns)) other_.reset();
-      }
-    } catch (const std::exception&) {
-      error_ = std::current_exception();
+    if (!packet_ && !damaged_) packet_ = nextPacket();
+    while (parts_.others && !other_ && !damaged_) {
+      other_ = parts_.others->next();
+      if (!other_) parts_.others.reset();
+      if (other_ && other_->t_ns && !limits_.contain(*other_->t_ns)) other_.reset();
     }
   }
 
@@ -174,6 +179,10 @@ class JoinedRecording : public Recording {
   std::optional<EventPacket> nextPacket() {
     const std::optional<std::size_t> next = nextCamera();
     if (!next) return std::nullopt;
+    if (parts_.cameras[*next].isAtDamage()) {
+      damaged_ = next;
+      return std::nullopt;
+    }
     packet_position_ = parts_.cameras[*next].stream().name();
     const bool announces = announced_ < parts_.cameras.size();
     const std::size_t camera = announces ? announced_++ : *next;
@@ -194,9 +203,9 @@ class JoinedRecording : public Recording {
   std::unique_ptr<BadEvents> bad_;  // the cameras refer to it
   std::size_t announced_ = 0;       // number of empty packets so far
   std::size_t next_pose_ = 0;
-  std::optional<EventPacket> packet_;  // the next packet
-  std::optional<OtherSample> other_;   // the next object
-  std::exception_ptr error_;           // the error that ended the events or the others
+  std::optional<EventPacket> packet_;   // the next packet
+  std::optional<OtherSample> other_;    // the next object
+  std::optional<std::size_t> damaged_;  // the camera whose damage ended the events
   std::string packet_position_;
   std::string position_ = "the recording";
 };

@@ -15,10 +15,10 @@ namespace efm {
 
 /// The parts that `join` puts together.
 struct JoinedParts {
-  Rig rig;                               ///< Rig that the packets have.
-  std::vector<EventPackets> cameras;     ///< One per camera of the rig.
-  std::vector<std::int64_t> offsets_ns;  ///< Offset from a camera's clock to the poses' clock.
-  std::vector<PoseSample> poses;         ///< The poses in any order; equal times keep theirs.
+  Rig rig;                            ///< Rig that the packets have.
+  std::vector<EventPackets> cameras;  ///< One per camera of the rig.
+  bool recalibrated = false;          ///< See `RecordingCounts`.
+  std::vector<PoseSample> poses;      ///< The poses in any order; equal times keep theirs.
   std::string poses_damage;  ///< The error that ended the poses: thrown at the recording's end.
   std::unique_ptr<OtherStream> others;  ///< Other objects; may be null.
   bool all_poses = false;       ///< True if poses outside the interval are kept, for a mapping.

@@ -113,47 +113,46 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
   if (all.one_camera.empty()) all.one_camera = std::move(parts.one_camera);
 }
 
-template <typename Read>
-bool reads(const Read& read) {
+/// Returns the calibration in a file; std::nullopt if `readCalibration` does not read the file.
+std::optional<Calibration> calibrationIn(const Path& path) {
+  constexpr std::uintmax_t kMaxBytes = 100'000;
+  std::error_code error;
+  if (!isFile(path) || std::filesystem::file_size(path, error) > kMaxBytes || error) return {};
   try {
-    read();
-    return true;
+    return readCalibration(path);
   } catch (const std::exception&) {
-    return false;
+    return std::nullopt;
   }
 }
 
-/// Returns whether `readCalibration` reads a file.
-bool isCalibration(const Path& path) {
-  constexpr std::uintmax_t kMaxBytes = 100'000;
-  std::error_code error;
-  return isFile(path) && std::filesystem::file_size(path, error) <= kMaxBytes && !error &&
-         reads([&] { readCalibration(path); });
-}
-
-/// Returns whether a file is a text of poses, also a compressed text.
-bool isPoses(const Path& path) {
-  bool poses = false;
-  return reads([&] { poses = isFile(path) && looksLikePoseLines(beginningOfText(path)); }) && poses;
+/// Returns a file with a text of poses, also a compressed text; std::nullopt for another file.
+std::optional<Path> posesIn(const Path& path) {
+  try {
+    if (isFile(path) && looksLikePoseLines(beginningOfText(path))) return path;
+  } catch (const std::exception&) {
+  }
+  return std::nullopt;
 }
 
 /// Throws an error: the kind of a file that is no recording, or the best-fitting reader's problem.
 [[noreturn]] void reject(const Path& path) {
   const std::string name = path.string();
-  if (path.extension() == ".ini" && !isCalibration(path)) {
+  if (path.extension() == ".ini" && !calibrationIn(path)) {
     throw std::runtime_error(name +
                              ": an .ini file among the sources: expected one option file, --config "
                              "NAME; a calibration is given with --calibration");
   }
-  if (isPoses(path)) throw std::runtime_error(name + ": poses: expected --poses " + name);
-  if (isCalibration(path)) {
+  if (posesIn(path)) throw std::runtime_error(name + ": poses: expected --poses " + name);
+  if (calibrationIn(path)) {
     throw std::runtime_error(name + ": a calibration: expected --calibration " + name);
   }
   const std::string why = whyNoRawlog(path).value_or("it looks like a rawlog");
   if (hasEventTable(beginningOfText(path))) {
     std::vector<Event> events;
-    EventTextStream(path).read(events);  // throws the error of its first line
-    throw std::runtime_error(name + ": there is no event after the header");
+    EventTextStream text(path);
+    text.read(events);
+    throw std::runtime_error(text.damage().empty() ? name + ": there is no event after the header"
+                                                   : text.damage());  // of its first line
   }
   throw std::runtime_error(
       fmt::format("{}: not a recording ({}): expected a rawlog, or a recording in another format "
@@ -161,29 +160,29 @@ bool isPoses(const Path& path) {
                   name, why));
 }
 
-/// Returns the only file of a folder with a part of the recording that its format did not find. If
-/// there are several such files, it adds their names to the text `expected`.
-/// @param has function that returns whether a file has the part.
+/// Returns a part of the recording that its format did not find: from the only file of the folder
+/// that has it. If there are several such files, it adds their names to the text `expected`.
+/// @param read function that returns the part in a file, if it has one.
 /// @param option option that gives another file.
-template <typename Has>
-std::optional<Path> onlyFileOf(const Path& folder, const Has& has, const char* option,
-                               RecordingParts& parts, std::string& expected) {
-  std::vector<Path> found;
+template <typename Read>
+auto onlyPartIn(const Path& folder, const Read& read, const char* option, RecordingParts& parts,
+                std::string& expected) {
+  std::map<Path, decltype(read(folder))> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (has(entry.path())) found.push_back(entry.path());
+    if (auto part = read(entry.path())) found.emplace(entry.path(), std::move(part));
   }
-  std::sort(found.begin(), found.end());
   if (found.size() == 1) {
     parts.notes.push_back(
         {"found-file", fmt::format("{}: taken, as the only one in the folder ({})",
-                                   found.front().string(), option)});
-    return found.front();
+                                   found.begin()->first.string(), option)});
+    return std::move(found.begin()->second);
   }
-  for (const Path& path : found) {
-    expected += (&path == &found.front() ? " (not clear: " : ", ") + path.filename().string();
+  const char* before = " (not clear: ";
+  for (const auto& [path, part] : found) {
+    expected += std::exchange(before, ", ") + path.filename().string();
   }
   if (!found.empty()) expected += ")";
-  return std::nullopt;
+  return decltype(read(folder))();
 }
 
 /// Takes calibration and poses of a folder from files whose names its format does not know.
@@ -191,17 +190,17 @@ void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
   const Path& folder = source.files.front();
   if (source.files.size() != 1 || !std::filesystem::is_directory(folder)) return;
   if (!parts.calibration && source.calibration.empty()) {
-    const auto has = [&](const Path& path) {
-      return isCalibration(path) &&
-             readCalibration(path).rig.cameras.size() == parts.cameras.size();
+    const auto fitting = [&](const Path& path) {
+      auto calibration = calibrationIn(path);
+      if (calibration && calibration->rig.cameras.size() != parts.cameras.size())
+        calibration.reset();
+      return calibration;
     };
-    if (const auto file =
-            onlyFileOf(folder, has, "--calibration", parts, parts.expected_calibration)) {
-      parts.calibration = readCalibration(*file);
-    }
+    parts.calibration =
+        onlyPartIn(folder, fitting, "--calibration", parts, parts.expected_calibration);
   }
   if (parts.poses.empty() && source.poses.empty()) {
-    if (const auto file = onlyFileOf(folder, isPoses, "--poses", parts, parts.expected_poses)) {
+    if (const auto file = onlyPartIn(folder, posesIn, "--poses", parts, parts.expected_poses)) {
       parts.poses = readPoses(*file, source.reader);
     }
   }
@@ -317,47 +316,51 @@ std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera
   return known;
 }
 
-/// Returns the recording's own rig if it has one and it is not replaced here. A mapping then
-/// replaces the rig, and counts the difference.
-Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given) {
+/// Returns whether calibrations are equal, except for the rounding of MRPT's poses.
+bool areNear(const RigCamera& own, const RigCamera& given) {
+  constexpr double kRounding = 1e-9;
+  const Rigid3 T_own_given = own.T_rig_cam.inverse() * given.T_rig_cam;
+  return own.model == given.model && T_own_given.translation.norm() < kRounding &&
+         T_own_given.rotation.vec().norm() < kRounding;
+}
+
+/// Returns the rig: by the given calibration, else the recording's own, with the given time
+/// offsets.
+/// @param recalibrated receives whether the given calibration replaces another one.
+Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given,
+          bool& recalibrated) {
   const std::size_t count = parts.cameras.size();
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
   if (own != nullptr) own->requireCameras(count);
-  const Calibration* const calibration = own != nullptr ? own : given;
-  if (calibration == nullptr && source.complete) {
+  if (own == nullptr && given == nullptr && source.complete) {
     throw std::runtime_error(fmt::format("{}: no calibration: expected {}, or --calibration FILE",
                                          sourceNames(source.files), parts.expected_calibration));
   }
-  Rig rig;
+  Rig recorded, rig;
   for (std::size_t camera = 0; camera < count; ++camera) {
     const std::optional<CameraSize> size = sizeOf(parts, camera, given, source);
-    if (calibration != nullptr) {
-      rig.cameras.push_back(calibration->camera(camera, size));
-    } else {
-      RigCamera& unknown = rig.cameras.emplace_back();
-      unknown.model.width = size.value_or(kUnknownSize).width;
-      unknown.model.height = size.value_or(kUnknownSize).height;
+    RigCamera& of_rig = recorded.cameras.emplace_back();
+    of_rig.model.width = size.value_or(kUnknownSize).width;
+    of_rig.model.height = size.value_or(kUnknownSize).height;
+    if (own != nullptr) {
+      of_rig = own->camera(camera, size);
+    } else if (given != nullptr) {
+      of_rig = given->camera(camera, size);
     }
   }
-  if (given != nullptr) given->requireLike(rig);
-  const bool replaced = given != nullptr && (own == nullptr || source.override_rig);
+  if (given != nullptr) given->requireLike(recorded);
+  const std::vector<std::int64_t>& offsets_ns = source.time_offsets_ns;
+  requireOption(offsets_ns.empty() || offsets_ns.size() == count,
+                OptionName("rig", "time_offsets_s", " (how many)"), offsets_ns.size(),
+                fmt::format("one per camera of the recording: {}", count));
   for (std::size_t camera = 0; camera < count; ++camera) {
-    RigCamera& of_rig = rig.cameras[camera];
-    if (replaced) of_rig = given->camera(camera, knownSize(of_rig.model));
+    RigCamera& of_rig = rig.cameras.emplace_back(recorded.cameras[camera]);
+    if (given != nullptr) of_rig = given->camera(camera, knownSize(of_rig.model));
+    recalibrated = recalibrated || (own != nullptr && !areNear(recorded.cameras[camera], of_rig));
     of_rig.T_rig_cam = roundedPose(of_rig.T_rig_cam);
+    if (!offsets_ns.empty()) of_rig.time_offset_ns = offsets_ns[camera];
   }
   return rig;
-}
-
-/// Returns the time offsets of the cameras that a mapping uses.
-std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& source,
-                                    const Calibration* given) {
-  if (source.time_offsets_ns.size() == rig.cameras.size()) return source.time_offsets_ns;
-  std::vector<std::int64_t> offsets_ns;
-  for (const RigCamera& camera : (given != nullptr ? given->rig : rig).cameras) {
-    offsets_ns.push_back(camera.time_offset_ns);
-  }
-  return offsets_ns;
 }
 
 /// Makes samples of poses without other data.
@@ -419,7 +422,7 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const RecordingSource& so
   if (source.faults.any()) {
     samples = withFaults(std::move(samples), source.faults, setup.T_body_rig, rig);
   }
-  if (source.override_rig && setup.T_body_rig) {
+  if (setup.T_body_rig) {
     for (PoseSample& sample : samples) {
       if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = *setup.T_body_rig;
     }
@@ -489,8 +492,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     parts.calibration.reset();
   }
   JoinedParts joined;
-  if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, given);
-  joined.offsets_ns = offsetsOf(joined.rig, source, given);
+  if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, given, joined.recalibrated);
   for (std::size_t i = 0; i < parts.cameras.size(); ++i) {
     const CameraModel& model = joined.rig.cameras[i].model;
     joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
@@ -527,9 +529,10 @@ namespace {
 class HostRecording : public Recording {
  public:
   explicit HostRecording(std::unique_ptr<Recording> of) : of_(std::move(of)) {}
-  std::optional<Sample> next() override {
-    return forHost(HostFace::kRecording, [this] { return of_->next(); });
+  std::optional<Sample> read() override {
+    return forHost(HostFace::kRecording, [this] { return of_->read(); });
   }
+  std::string damage() const override { return hostText(of_->damage(), HostFace::kRecording); }
   const Rig& rig() const override { return of_->rig(); }
   std::string position() const override { return of_->position(); }
   double progress() const override { return of_->progress(); }

@@ -32,16 +32,12 @@ struct RecordingSource {
   /// The cameras of the given calibration that the recording has, if it has fewer. Empty: all.
   std::vector<int> cameras;
   TrackerFaults faults;  ///< Faults of the poses of trackers (PoseKind::kPose).
-  /// True if the given calibration and hand-eye transform replace those of the recording. If false,
-  /// they are used only if the recording has none: the mapping's options replace the others later.
-  bool override_rig = true;
-
   ReaderOptions reader;
   /// The maximum number of bad events that are left out of the recording. One more is an error.
   std::uint64_t skip_bad_events = 0;
   std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
   TimeLimits limits;                         ///< See `join`.
-  /// Time offsets of the cameras that replace the calibration's offsets for `limits`; empty: none.
+  /// Time offsets of the cameras that replace those of the calibration; empty: none.
   std::vector<std::int64_t> time_offsets_ns;
   /// True if missing poses, or a missing calibration, are an error. Cameras without a calibration
   /// have a model without a focal length.
@@ -56,7 +52,8 @@ RigSetup readRigSetup(const RecordingSource& source);
 std::vector<std::string> recordingFormats();
 
 /// Opens a recording: a rawlog, or files and folders of `readerFormats`, whose cameras and poses
-/// are put together in the order of the files.
+/// are put together in the order of the files. Applies the given calibration, hand-eye transform
+/// and time offsets: nothing changes the rig afterwards.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
 struct Overrides;  // event_fusion/engine.h

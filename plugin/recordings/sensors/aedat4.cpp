@@ -375,7 +375,7 @@ class Aedat4Stream : public EventStream {
         stream_(file_, std::ios::binary),
         next_byte_(header_->packets_begin) {}
 
-  bool read(std::vector<Event>& events) override {
+  bool decode(std::vector<Event>& events) override {
     events.clear();
     if (!readPacket()) return false;
     FlatTable::Elements packet;  // not aligned

@@ -211,7 +211,7 @@ class PropheseeRawStream : public EventStream {
     stream_.seekg(static_cast<std::streamoff>(header_.bytes));
   }
 
-  bool read(std::vector<Event>& events) override {
+  bool decode(std::vector<Event>& events) override {
     events.clear();
     at_block_ = decoder_;
     if (readBlock()) {

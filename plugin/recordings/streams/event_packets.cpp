@@ -41,10 +41,7 @@ void EventPackets::startAt(std::int64_t t_ns) {
 
 std::vector<Event> EventPackets::nextPacket() {
   readAhead();
-  if (first_ == events_.size()) {
-    if (error_) std::rethrow_exception(error_);
-    return {};
-  }
+  if (first_ == events_.size()) return {};
   const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
   const std::size_t most = std::min(events_.size() - first_, kMaxPacketEvents);
   const auto end = std::partition_point(
@@ -57,13 +54,16 @@ std::vector<Event> EventPackets::nextPacket() {
 std::optional<std::int64_t> EventPackets::nextTime() {
   readAhead();
   if (first_ < events_.size()) return events_[first_].t_ns;
-  if (!error_) return std::nullopt;
-  if (newest_ns_ == -kEndOfTimeNs) std::rethrow_exception(error_);
-  return newest_ns_;
+  return damage_.empty() ? std::nullopt : std::optional(newest_ns_);
+}
+
+bool EventPackets::isAtDamage() {
+  readAhead();
+  return first_ == events_.size() && !damage_.empty();
 }
 
 void EventPackets::readAhead() {
-  while (!ended_ && !error_ && !packetIsComplete()) {
+  while (!ended_ && !stopped_ && damage_.empty() && !packetIsComplete()) {
     events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
     first_ = 0;
     readBlock();
@@ -90,34 +90,23 @@ bool EventPackets::packetIsComplete() const {
   return newest_ns_ - kMaxEventDelayNs >= end_ns;
 }
 
-/// Reads the next block. Events before damage are kept: the error is thrown after them.
+/// Reads the next block. The events before damage are taken.
 void EventPackets::readBlock() {
-  std::exception_ptr damaged;
-  try {
-    ended_ = !stream_->read(block_);
-  } catch (const std::exception&) {
-    damaged = std::current_exception();
+  ended_ = !stream_->read(block_);
+  takeBlock();
+  if (ended_ || !damage_.empty()) {
+    checker_.finish(damage_.empty() && stream_->damage().empty());
+    takeSettled();
+    if (damage_.empty()) rejectDisorder();
   }
-  try {
-    takeBlock();
-    if (ahead_ && (ended_ || damaged)) {
-      const std::int64_t t_ns = ahead_->t_ns;
-      const bool bad =
-          ended_ && t_ns - kMaxEventDelayNs < stop_ns_ && t_ns - newest_ns_ > kMaxLastPauseNs;
-      settleAhead(bad ? newest_ns_ : t_ns);
-    }
-  } catch (const std::runtime_error&) {
-    error_ = std::current_exception();
-  }
-  if (!error_ && !ended_) error_ = damaged;
+  if (damage_.empty() && !stopped_ && !stream_->sharesDamage()) damage_ = stream_->damage();
 }
 
-bool EventPackets::isGood(const Event& event) const {
-  const bool in_order = event.t_ns >= newest_ns_ || newest_ns_ - event.t_ns <= kMaxEventDelayNs;
-  return event.x < size_.width && event.y < size_.height && event.t_ns < kEndOfTimeNs && in_order;
+bool EventPackets::isPossible(const Event& event) const {
+  return event.x < size_.width && event.y < size_.height && event.t_ns < kEndOfTimeNs;
 }
 
-/// Describes why an event of the block is wrong.
+/// Describes why an event of the block cannot be.
 std::string EventPackets::problemOf(std::size_t i) const {
   const auto problem = [&](const char* name, const auto& value, const std::string& expected) {
     return fmt::format("{}: {} = '{}': expected {}", stream_->positionOf(i), name, value, expected);
@@ -131,16 +120,23 @@ std::string EventPackets::problemOf(std::size_t i) const {
   const Event& event = block_[i];
   if (event.x >= size_.width) return pixel_problem("x", event.x, size_.width);
   if (event.y >= size_.height) return pixel_problem("y", event.y, size_.height);
-  if (event.t_ns >= kEndOfTimeNs) {
-    return problem("t", event.t_ns, "a time in ns before the year 2116");
+  return problem("t", event.t_ns, "a time in ns before the year 2116");
+}
+
+/// Describes the wrong time of an event of the block. @param newest_ns of the events before it.
+std::string EventPackets::timeProblemOf(std::size_t i, std::int64_t newest_ns) const {
+  const std::int64_t t_ns = block_[i].t_ns;
+  std::string expected = "a time near those of the events after it" + inOrder();
+  if (newest_ns > t_ns) {
+    expected = fmt::format("events in time order, at most 10 ms before the newest ({}){}",
+                           formatSeconds(newest_ns), inOrder());
+  } else if (newest_ns != -kEndOfTimeNs) {
+    expected =
+        fmt::format("a time near those of the events beside it, of which the one before is at {}{}",
+                    formatSeconds(newest_ns), inOrder());
   }
-  const char* const expected =
-      event.t_ns > newest_ns_
-          ? "a time near those of the events beside it, of which the one before is at {}"
-          : "events in time order, at most 10 ms before the newest ({})";
-  return problem("t", formatSeconds(event.t_ns),
-                 fmt::format(expected, formatSeconds(newest_ns_)) +
-                     (event.t_ns > newest_ns_ ? "" : inOrder()));
+  return fmt::format("{}: t = '{}': expected {}", stream_->positionOf(i), formatSeconds(t_ns),
+                     expected);
 }
 
 /// Returns what sorts the events, for errors.
@@ -153,21 +149,22 @@ std::string EventPackets::inOrder() const {
 void EventPackets::rejectDisorder() {
   constexpr std::uint64_t kEnough = 1000;
   constexpr std::uint64_t kFew = 10;
-  const bool many = read_events_ >= kEnough && 5 * late_events_ > read_events_;  // before the end
-  const bool some = ended_ && late_events_ >= kFew && 100 * late_events_ > read_events_;
-  if (!many && !some) return;
+  const bool at_end = ended_ || stopped_;
+  const std::uint64_t share = at_end ? 100 : 5;
+  const bool enough = at_end || read_events_ >= kEnough;
+  if (!enough || late_bursts_ < kFew || share * late_events_ <= read_events_) return;
   if (read_events_ <= block_.size()) events_.clear();  // none of them was used yet
-  throw std::runtime_error(fmt::format(
+  damage_ = fmt::format(
       "{}: {} of {} events are over 10 ms late, first {}: expected events in time order{}; "
       "--skip-bad-events is for at most 1 % of late events",
-      stream_->name(), late_events_, read_events_, first_late_, inOrder()));
+      stream_->name(), late_events_, read_events_, first_late_, inOrder());
 }
 
 void EventPackets::take(const Event& event) {
   if (event.t_ns >= newest_ns_) {
     newest_ns_ = event.t_ns;
-    ended_ = newest_ns_ - kMaxEventDelayNs >= stop_ns_;
-    if (ended_) return;
+    stopped_ = newest_ns_ - kMaxEventDelayNs >= stop_ns_;
+    if (stopped_) return;
   } else {
     disordered_ = true;
     ++sorted_events_;
@@ -182,54 +179,74 @@ void EventPackets::take(const Event& event) {
 }
 
 void EventPackets::takeBlock() {
+  constexpr std::uint64_t kBurst = 1000;
   events_.reserve(events_.size() + block_.size());
-  for (std::size_t i = 0; i < block_.size(); ++i) {
+  for (std::size_t i = 0; i < block_.size() && damage_.empty(); ++i) {
     const Event& event = block_[i];
-    if (ahead_) settleAhead(event.t_ns);
-    if (ended_) return rejectDisorder();  // errors after this time do not matter
+    if (stopped_) return rejectDisorder();  // errors after this time do not matter
     ++read_events_;
-    if (!isGood(event)) {
-      if (event.t_ns < newest_ns_ - kMaxEventDelayNs && late_events_++ == 0) {
-        first_late_ = stream_->positionOf(i);
-      }
+    if (!isPossible(event)) {
       reject(problemOf(i));
-    } else if (event.t_ns - newest_ns_ <= kFarAheadNs || newest_ns_ == -kEndOfTimeNs) {
+    } else if (checker_.pass(event)) {
+      late_in_row_ = 0;
       take(event);
+    } else if (checker_.add(event, [&](auto newest_ns) { return timeProblemOf(i, newest_ns); }) ==
+               EventChecker::Verdict::kWaits) {
+      late_in_row_ = 0;
+      takeSettled();
     } else {
-      ahead_ = event;
-      ahead_problem_ = problemOf(i);
+      if (late_events_++ == 0) first_late_ = stream_->positionOf(i);
+      if (late_in_row_++ % kBurst == 0) ++late_bursts_;
+      reject(timeProblemOf(i, newest_ns_));
     }
   }
-  rejectEqualTimes();
-  rejectDisorder();
+  if (damage_.empty()) rejectEqualTimes();
+  if (damage_.empty()) rejectDisorder();
+}
+
+/// Takes the events whose times are known to be right now, and rejects the others.
+void EventPackets::takeSettled() {
+  const bool ends = !damage_.empty();
+  const std::string* burst = nullptr;
+  for (const auto& [event, problem] : checker_.takeSettled()) {
+    if (stopped_ || (!ends && !damage_.empty())) return;
+    if (problem == nullptr) {
+      take(event);
+    } else if (!ends && event.t_ns - kMaxEventDelayNs < stop_ns_) {
+      if (late_events_++ == 0) first_late_ = problem->substr(0, problem->find(": t = "));
+      if (std::exchange(burst, problem) != problem) ++late_bursts_;
+      reject(*problem);
+    }
+  }
 }
 
 /// Counts in whole blocks, which costs nothing: too many events of one time fill several blocks.
 void EventPackets::rejectEqualTimes() {
   constexpr std::int64_t kMaxPixels = std::int64_t{1} << 21;  // if the sensor is unknown
   const auto pixels = std::min(kMaxPixels, std::int64_t{1} * size_.width * size_.height);
-  const bool equal = !block_.empty() && block_.front().t_ns == block_.back().t_ns &&
-                     block_.front().t_ns == newest_ns_;
-  equal_times_ = equal ? equal_times_ + static_cast<std::int64_t>(block_.size()) : 0;
+  if (block_.empty()) return;
+  const std::int64_t t_ns = block_.front().t_ns;
+  const bool equal = t_ns == block_.back().t_ns && t_ns == checker_.lastNs();
+  if (!equal || t_ns != std::exchange(equal_ns_, t_ns)) equal_times_ = 0;
+  if (equal) equal_times_ += static_cast<std::int64_t>(block_.size());
   if (equal_times_ <= 4 * pixels) return;
-  throw std::runtime_error(fmt::format(
+  damage_ = fmt::format(
       "{}: t = '{}': {} events have this time, over 4 a pixel: expected times that differ (are the "
       "column and the unit of the times right, and are they no float32?)",
-      stream_->positionOf(block_.size() - 1), formatSeconds(newest_ns_), equal_times_));
+      stream_->positionOf(block_.size() - 1), formatSeconds(t_ns), equal_times_);
 }
 
-/// Takes the event that is far ahead, or rejects it if the next event is in order without it.
-void EventPackets::settleAhead(std::int64_t next_ns) {
-  const Event ahead = *std::exchange(ahead_, std::nullopt);
-  const bool back = next_ns < ahead.t_ns - kMaxEventDelayNs;
-  if (back && next_ns >= newest_ns_ - kMaxEventDelayNs) return reject(ahead_problem_);
-  take(ahead);
-}
-
-/// Leaves out a wrong event, or throws its error if wrong events are not allowed.
+/// Leaves out a wrong event; where wrong events are not allowed, it is damage.
 void EventPackets::reject(const std::string& problem) {
-  if (bad_ == nullptr) throw std::runtime_error(problem);
-  bad_->skip(problem);
+  if (bad_ == nullptr) {
+    damage_ = problem;
+    return;
+  }
+  try {
+    bad_->skip(problem);
+  } catch (const std::runtime_error& too_many) {
+    damage_ = too_many.what();
+  }
 }
 
 }  // namespace efm

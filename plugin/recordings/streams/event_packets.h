@@ -3,12 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "mapping/events/event_checker.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/recording_parts.h"
 
@@ -22,12 +22,10 @@ inline constexpr std::size_t kMaxPacketEvents = std::size_t{1} << 20;
 
 /// Checks the events of a camera, sorts events that are up to 10 ms late and divides the events
 /// into packets on a grid of time. It reads on demand: memory holds one block, one packet and the
-/// events of 10 ms. More than 4 events per pixel at one time are an error. An event is wrong if it
-/// is over 1 s ahead of both its neighbours, or over 10 s ahead at the end. If more than 1 % of the
-/// events, at least ten, are over 10 ms late, they are not in order at all: an error, also if wrong
-/// events may be left out. A wrong event is a std::runtime_error that names the position, the value
-/// and the expected value. The error is thrown after the packets of the earlier events, and again
-/// by every further call.
+/// events of 10 ms. More than 4 events per pixel at one time are an error. `EventChecker` tells
+/// whose times are wrong. If more than 1 % of the events are over 10 ms late, and not in a few
+/// bursts, they are not in order at all: an error, also if wrong events may be left out. A wrong
+/// event is a damage: it ends the packets, after the earlier events.
 class EventPackets {
  public:
   /// @param size size of the sensor: events outside it are wrong.
@@ -37,6 +35,10 @@ class EventPackets {
 
   /// Counts wrong events in `bad` and leaves them out. Call it first. `bad` must outlive this.
   void skipBadEvents(BadEvents& bad);
+  /// Poses of these times, on the camera's clock, confirm the first and the last events.
+  void expectPoses(std::int64_t first_ns, std::int64_t last_ns) {
+    checker_.expectPoses(first_ns, last_ns);
+  }
   /// Leaves out the events before a time, without reading them if the format allows it. Call it
   /// before `nextPacket` and `nextTime`.
   void startAt(std::int64_t t_ns);
@@ -47,10 +49,13 @@ class EventPackets {
   /// keep the order of the file. More than `kMaxPacketEvents` events become several packets, even
   /// if all have the same time. The packet is empty at the end.
   std::vector<Event> nextPacket();
-  /// Returns the first time of the next packet; std::nullopt at the end. If the next call of
-  /// `nextPacket` throws, it returns the time of the newest event.
-  /// @throws std::runtime_error at a wrong event if there is no event before it.
+  /// Returns the first time of the next packet; std::nullopt at the end. At damage, the time of the
+  /// newest event.
   std::optional<std::int64_t> nextTime();
+  /// Returns whether damage comes next.
+  bool isAtDamage();
+  /// Returns the position, value and expected value of the damage; empty if there is none so far.
+  const std::string& damage() const { return damage_; }
 
   /// The number of events that came after a newer event.
   std::uint64_t sortedEvents() const { return sorted_events_; }
@@ -66,13 +71,14 @@ class EventPackets {
   void readBlock();
   void takeBlock();
   void take(const Event& event);
-  void settleAhead(std::int64_t next_ns);
+  void takeSettled();
   void rejectEqualTimes();
   void rejectDisorder();
   std::string inOrder() const;
   void reject(const std::string& problem);
-  bool isGood(const Event& event) const;
+  bool isPossible(const Event& event) const;
   std::string problemOf(std::size_t i) const;
+  std::string timeProblemOf(std::size_t i, std::int64_t newest_ns) const;
 
   std::unique_ptr<EventStream> stream_;
   CameraSize size_;
@@ -83,17 +89,20 @@ class EventPackets {
   std::optional<std::int64_t> before_ns_, after_ns_;
   std::uint64_t read_events_ = 0;
   std::uint64_t late_events_ = 0;  // over 10 ms
-  std::string first_late_;         // position of the first of them
-  bool ended_ = false;
-  std::exception_ptr error_;  // the error of the wrong event
+  std::uint64_t late_bursts_ = 0;  // successive ones, at most 1000
+  std::uint64_t late_in_row_ = 0;
+  std::string first_late_;  // position of the first of them
+  bool ended_ = false;      // the stream
+  bool stopped_ = false;    // over 10 ms after stop_ns_
+  std::string damage_;
 
   std::vector<Event> block_;
   std::vector<Event> events_;  // sorted between calls; events before first_ were returned
   std::size_t first_ = 0;
   std::int64_t newest_ns_ = -kEndOfTimeNs;
-  std::int64_t equal_times_ = 0;  // number of events at newest_ns_, in the last blocks
-  std::optional<Event> ahead_;    // far ahead; the next event shows if it is bad
-  std::string ahead_problem_;
+  std::int64_t equal_times_ = 0;  // number of events at equal_ns_, in the last blocks
+  std::int64_t equal_ns_ = 0;
+  EventChecker checker_;
   bool disordered_ = false;
   std::uint64_t sorted_events_ = 0;
 };

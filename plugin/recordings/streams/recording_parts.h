@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <any>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -53,10 +54,19 @@ class EventStream {
 
   /// Replaces `events` by the next events, in the order of the file. Memory holds one block: some
   /// ten or hundred thousand events, whatever the size of the file.
-  /// @return false at the end; `events` is empty then.
-  /// @throws std::runtime_error at damaged data, naming the file, position, value and expected
-  /// value. `events` then has the events before the damage. The stream is not read again.
-  virtual bool read(std::vector<Event>& events) = 0;
+  /// @return false at the end; `events` is empty then. False also at damage: `events` then has the
+  /// events before the damage. The stream is not read again.
+  bool read(std::vector<Event>& events) {
+    try {
+      return decode(events);
+    } catch (const std::exception& error) {
+      damage_ = error.what();
+      return false;
+    }
+  }
+  /// Returns the file, position, value and expected value of the damage that ended the stream;
+  /// empty if there is none.
+  const std::string& damage() const { return damage_; }
 
   /// From now on, counts a damaged event in `bad` and leaves it out if the rest of the data can be
   /// read without it. Other damage is still an error. `bad` must outlive the stream.
@@ -72,9 +82,9 @@ class EventStream {
   virtual std::string name() const = 0;
   /// The fraction of the stream that has been read, 0 to 1.
   virtual double progress() const = 0;
-  /// The error of damage that ends all streams of the file: `read` then returns false, and the
-  /// error is thrown at the recording's end. Empty if there is no damage so far.
-  virtual std::string damage() const { return {}; }
+  /// Whether damage ends all streams of the file, each at the same place of the file: the others
+  /// are read to it.
+  virtual bool sharesDamage() const { return false; }
   /// The sensor's name, if the file has it.
   virtual std::string label() const { return {}; }
   /// The original object of the last block: see `EventPacket`.
@@ -91,6 +101,13 @@ class EventStream {
   /// Warnings about properties that the file does not state and that the reader concluded from the
   /// values: `time-unit`, `event-columns`.
   virtual std::vector<Warning> warnings() const { return {}; }
+
+ protected:
+  /// Reads a block: see `read`. @throws std::runtime_error at damage.
+  virtual bool decode(std::vector<Event>& events) = 0;
+
+ private:
+  std::string damage_;
 };
 
 /// A picture of a list. The truth's: float32 TIFF, z-depth in metres in camera 0's undistorted
@@ -163,6 +180,9 @@ struct ReaderOptions {
   bool keep_originals = false;  ///< True if poses of a rawlog keep their originals: see PoseSample.
   /// True if `topics` may name topics of other files. Otherwise an unknown name is an error.
   bool topics_of_other_files = false;
+  /// What the scan of a rawlog found, for the next opening of the same file; null: it is scanned
+  /// again.
+  std::shared_ptr<std::any> scan = nullptr;
   bool lists_topics = false;      ///< True if `RecordingParts::topics` is needed.
   bool leaves_out_poses = false;  ///< True if another file gives the poses.
   /// True if the user gives a hand-eye transform: a bag's transforms do not join its poses' frame

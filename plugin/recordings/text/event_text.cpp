@@ -193,7 +193,7 @@ EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions
   usual_ = columns_.isUsual();
 }
 
-bool EventTextStream::read(std::vector<Event>& events) {
+bool EventTextStream::decode(std::vector<Event>& events) {
   events.clear();
   lines_.clear();
   if (started_ && ended_) return false;

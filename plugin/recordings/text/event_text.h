@@ -29,7 +29,7 @@ class EventTextStream : public EventStream {
   explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {},
                            std::vector<std::string> cameras = {}, std::size_t camera = 0);
 
-  bool read(std::vector<Event>& events) override;
+  bool decode(std::vector<Event>& events) override;
   void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
   /// Finds the time by bisection, to 64 KiB. A compressed file stays at its beginning.
   void seek(std::int64_t t_ns) override;

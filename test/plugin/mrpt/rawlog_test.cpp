@@ -179,6 +179,31 @@ TEST_F(Rawlog, ObservationsOfFramesComeOneByOneWithoutActionsAndComments) {
   EXPECT_THAT(contents.others, testing::ElementsAre("mrpt::obs::CObservationGPS"));
 }
 
+// All streams are read at once. A stream far behind another one reads on its own: the events of one
+// camera come after all those of the other, more than may wait.
+TEST_F(Rawlog, MayHaveTheEventsOfOneCameraAfterThoseOfTheOther) {
+  constexpr std::int64_t kEvents = 1'100'000;
+  Observations observations;
+  for (const int camera : {0, 1}) {
+    for (const CObservation::Ptr& observation : recorded) {
+      const auto first = std::dynamic_pointer_cast<CObservationEvents>(observation);
+      if (!first || first->camera_index != camera) continue;
+      for (std::int64_t i = 0; i < kEvents; i += kEvents / 10) {
+        auto packet = std::make_shared<CObservationEvents>(*first);
+        packet->events.clear();
+        packet->covered_until_ns.reset();
+        for (std::int64_t k = i; k < i + kEvents / 10; ++k) packet->events.push_back({k * 1'000});
+        observations.push_back(packet);
+      }
+      break;
+    }
+  }
+  write(observations);
+  const Contents contents = read(file());
+  EXPECT_EQ(contents.error, "");
+  expectSame(contents, contentsOf(observations, observations.size()));
+}
+
 TEST_F(Rawlog, OfMovementsWithoutATimeTheLastPoseIsThatOfTheFrame) {
   mrpt::obs::CActionRobotMovement2D movement;
   movement.timestamp = INVALID_TIMESTAMP;
@@ -496,8 +521,7 @@ TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
   write("up.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
   save(observationsOnly(Says::kOdometry), "odometry.rawlog");
   mapOf("odometry.rawlog --hand-eye up.yaml");
-  EXPECT_NEAR(readPoses(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7,
-              1e-9);
+  EXPECT_NEAR(readPoses(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7, 1e-9);
   const Result result = run("import odometry.rawlog --out r.rawlog --hand-eye up.yaml");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.err, HasSubstr("cannot hold the hand-eye transform: give it to map as well"));

@@ -458,22 +458,16 @@ class CalibratedSession : public TemporaryFolder {
   }
 };
 
-TEST_F(CalibratedSession, UsesTheOptionsCalibrationAndCountsDifferentCameras) {
+TEST_F(CalibratedSession, UsesTheOptionsCalibration) {
   const SyntheticRecording recording;
   std::vector<RigCamera> cameras = recording.cameras;
-  MappingSession same(optionsOf(cameras));
-  mapAll(same, recording);
-  EXPECT_EQ(same.status().recalibrated_cameras, 0U);
-
   cameras[1].T_rig_cam.translation.y() += 1e-3;
   MappingSession moved(optionsOf(cameras));
   mapAll(moved, recording);
-  EXPECT_EQ(moved.status().recalibrated_cameras, 1U);
   EXPECT_NEAR(moved.status().rig.cameras[1].T_rig_cam.translation.y(), 1e-3, 1e-12);
   cameras[0].model.cx += 1;
   MappingSession both(optionsOf(cameras));
   mapAll(both, recording);
-  EXPECT_EQ(both.status().recalibrated_cameras, 2U);
   EXPECT_EQ(both.status().rig.cameras[0].model.cx, recording.cameras[0].model.cx + 1);
 }
 

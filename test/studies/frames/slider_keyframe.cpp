@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/open/recording_formats.h"
 #include "test/studies/frames/slider_keyframe.h"
+#include "plugin/recordings/open/recording_formats.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -28,6 +28,7 @@ SliderRecording readSlider(const std::filesystem::path& folder) {
       if (event.t_ns >= first_pose_ns) recording.events.push_back(event);
     }
   }
+  if (!reader.damage().empty()) throw std::runtime_error(reader.damage());
   if (recording.events.empty()) {
     throw std::runtime_error((folder / "events.txt").string() + ": no event has a pose");
   }

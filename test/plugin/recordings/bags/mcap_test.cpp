@@ -132,8 +132,9 @@ TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
     std::vector<Event> block;
     const std::string damage = errorOf([&] {
       while (true) {
-        recording.cameras.at(0)->read(block);
+        const bool more = recording.cameras.at(0)->read(block);
         read.insert(read.end(), block.begin(), block.end());
+        if (!more) throw std::runtime_error(recording.cameras.at(0)->damage());
       }
     });
     EXPECT_THAT(damage, AllOf(StartsWith(file_.string() + ": byte "), HasSubstr(expected),

@@ -206,7 +206,7 @@ TEST_F(EventArrays, AnErrorNamesTheFileTheRowAndTheExpectedValue) {
   for (const auto& row : rows) {
     const fs::path file = write("e.npy", row.bytes);
     std::vector<Event> events;
-    EXPECT_THAT(errorOf([&] { openEventArrays({file}, {}).cameras.at(0)->read(events); }),
+    EXPECT_THAT(errorOf([&] { readBlock(*openEventArrays({file}, {}).cameras.at(0), events); }),
                 AllOf(StartsWith(file.string()), HasSubstr(row.error)));
     EXPECT_EQ(events.size(), row.events) << row.error;
   }

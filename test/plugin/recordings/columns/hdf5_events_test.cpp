@@ -203,7 +203,7 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
     write(columns);
     const RecordingParts parts = openHdf5({file()}, {});
     std::vector<Event> block;
-    EXPECT_EQ(errorOf([&] { parts.cameras.at(0)->read(block); }), expected);
+    EXPECT_EQ(errorOf([&] { readBlock(*parts.cameras.at(0), block); }), expected);
     EXPECT_EQ(block.size(), events_before);
   };
   Columns columns;

@@ -74,7 +74,6 @@ class JoinedRecordingTest : public TemporaryFolder {
       camera.model.fx = camera.model.fy = 200 + static_cast<double>(n);
       camera.T_rig_cam.translation.x() = static_cast<double>(n);
       camera.time_offset_ns = static_cast<std::int64_t>(n) * 100;
-      parts.offsets_ns.push_back(camera.time_offset_ns);
       const std::filesystem::path file = folder() / ("cam" + std::to_string(n)) / "events.txt";
       writeFile(file, texts[n]);
       parts.cameras.emplace_back(std::make_unique<EventTextStream>(file), CameraSize{240, 180});
@@ -213,7 +212,7 @@ TEST_F(JoinedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
 /// A camera whose file reports lost events.
 struct LossyStream : EventStream {
   explicit LossyStream(std::uint64_t packets) : lost(packets) {}
-  bool read(std::vector<Event>&) override { return false; }
+  bool decode(std::vector<Event>&) override { return false; }
   std::string positionOf(std::size_t) const override { return ""; }
   std::string name() const override { return ""; }
   double progress() const override { return 1; }
@@ -226,7 +225,6 @@ struct LossyStream : EventStream {
 TEST_F(JoinedRecordingTest, ItsLossesAreThoseOfAllCameras) {
   JoinedParts parts;
   parts.rig.cameras.resize(2);
-  parts.offsets_ns = {0, 0};
   for (const std::uint64_t lost : {2, 3}) {
     parts.cameras.emplace_back(std::make_unique<LossyStream>(lost), CameraSize{240, 180});
   }

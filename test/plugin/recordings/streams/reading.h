@@ -17,20 +17,28 @@
 
 namespace efm {
 
-/// Returns all events of a stream.
+/// Reads the next block of a stream. @throws std::runtime_error at damage; `events` are before it.
+inline bool readBlock(EventStream& stream, std::vector<Event>& events) {
+  const bool more = stream.read(events);
+  if (!stream.damage().empty()) throw std::runtime_error(stream.damage());
+  return more;
+}
+
+/// Returns all events of a stream. @throws std::runtime_error at damage.
 inline std::vector<Event> readStream(EventStream& stream) {
   std::vector<Event> events;
   std::vector<Event> block;
-  while (stream.read(block)) events.insert(events.end(), block.begin(), block.end());
+  while (readBlock(stream, block)) events.insert(events.end(), block.begin(), block.end());
   return events;
 }
 
-/// Returns the events of all packets.
+/// Returns the events of all packets. @throws std::runtime_error at damage.
 inline std::vector<Event> readPackets(EventPackets& packets) {
   std::vector<Event> events;
   for (auto packet = packets.nextPacket(); !packet.empty(); packet = packets.nextPacket()) {
     events.insert(events.end(), packet.begin(), packet.end());
   }
+  if (!packets.damage().empty()) throw std::runtime_error(packets.damage());
   return events;
 }
 

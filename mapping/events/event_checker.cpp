@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/events/event_checker.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace efm {
+namespace {
+
+// Longer than bursts of wrong times: a time word of a sensor counts for some milliseconds.
+constexpr std::int64_t kConfirmingNs = 100'000'000;
+constexpr std::size_t kConfirmingEvents = 2000;
+constexpr std::size_t kMaxRuns = 512;
+constexpr std::size_t kMaxWaiting = 20'000;  // many times a burst
+
+}  // namespace
+
+bool EventChecker::Run::isConfirmed() const {
+  return max_ns - min_ns >= kConfirmingNs || end - begin >= kConfirmingEvents;
+}
+
+bool EventChecker::arePosesNear(const Run& run) const {
+  return poses_ns_ && run.min_ns >= poses_ns_->first - kNanosecondsPerSecond &&
+         run.max_ns <= poses_ns_->second + kNanosecondsPerSecond;
+}
+
+EventChecker::Verdict EventChecker::add(
+    const Event& event, const std::function<std::string(std::int64_t)>& problem_of) {
+  const std::int64_t t_ns = event.t_ns;
+  if (t_ns < newest_ns_ - kMaxEventDelayNs) return Verdict::kLate;
+  const bool follows = !runs_.empty() && t_ns >= runs_.back().max_ns - kMaxEventDelayNs &&
+                       t_ns <= runs_.back().max_ns + kMaxEventDelayNs;
+  if (!follows) {
+    runs_.push_back({waiting_.size(), 0, t_ns, t_ns, problem_of(lastNs())});
+  }
+  waiting_.push_back(event);
+  Run& run = runs_.back();
+  run.end = waiting_.size();
+  run.min_ns = std::min(run.min_ns, t_ns);
+  run.max_ns = std::max(run.max_ns, t_ns);
+  if (run.isConfirmed()) {
+    settle(Settle::kToConfirmed);
+  } else if (runs_.size() == kMaxRuns || waiting_.size() == kMaxWaiting) {
+    settle(Settle::kToMiddle);
+  }
+  return Verdict::kWaits;
+}
+
+/// Returns the runs that are in order and have the most events together.
+/// @param ends_with_last whether the last run must be one of them.
+std::vector<std::size_t> EventChecker::longestChain(bool ends_with_last) const {
+  constexpr std::size_t kNone = kMaxRuns;
+  std::vector<std::size_t> events(runs_.size()), before(runs_.size(), kNone);
+  std::size_t last = kNone;
+  for (std::size_t b = 0; b < runs_.size(); ++b) {
+    const bool late = runs_[b].min_ns < newest_ns_ - kMaxEventDelayNs;
+    if (runs_[b].wrong || late) continue;
+    std::size_t most = 0;
+    for (std::size_t a = 0; a < b; ++a) {
+      const bool in_order = runs_[b].min_ns >= runs_[a].max_ns - kMaxEventDelayNs;
+      if (events[a] == 0 || !in_order || events[a] < most) continue;
+      most = events[a];
+      before[b] = a;
+    }
+    events[b] = most + runs_[b].end - runs_[b].begin;
+    if (last == kNone || events[b] >= events[last]) last = b;
+  }
+  if (ends_with_last) last = runs_.size() - 1;
+  std::vector<std::size_t> chain;
+  for (; last != kNone; last = before[last]) chain.push_back(last);
+  std::reverse(chain.begin(), chain.end());
+  return chain;
+}
+
+/// Marks the first and the last runs of a chain as wrong, if a pause of over 10 s divides them from
+/// the others, and nothing confirms them. @return whether there are any.
+bool EventChecker::rejectLoose(const std::vector<std::size_t>& chain, bool at_end) {
+  const auto is_sure = [&](std::size_t first, std::size_t last) {  // runs of the chain, inclusive
+    std::size_t events = 0;
+    for (std::size_t i = first; i <= last; ++i) {
+      if (arePosesNear(runs_[chain[i]])) return true;
+      events += runs_[chain[i]].end - runs_[chain[i]].begin;
+    }
+    return events >= kConfirmingEvents ||
+           runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= kConfirmingNs;
+  };
+  const auto is_long = [&](std::int64_t from_ns, std::size_t to) {
+    return runs_[chain[to]].min_ns - from_ns > kMaxLastPauseNs;
+  };
+  const auto reject = [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i <= last; ++i) runs_[chain[i]].wrong = true;
+    return true;
+  };
+  const bool begins = newest_ns_ == -kEndOfTimeNs;  // no event was confirmed yet
+  std::size_t loose = 0;                            // the runs before the first long pause
+  while (loose + 1 < chain.size() && !is_long(runs_[chain[loose]].max_ns, loose + 1)) ++loose;
+  const bool has_more = loose + 1 < chain.size() && is_sure(loose + 1, chain.size() - 1);
+  if (begins && has_more && !is_sure(0, loose)) return reject(0, loose);
+  if (!at_end || chain.empty()) return false;
+  loose = chain.size() - 1;  // the runs behind the last long pause
+  while (loose > 0 && !is_long(runs_[chain[loose - 1]].max_ns, loose)) --loose;
+  const bool divided = loose > 0 || (!begins && is_long(newest_ns_, 0));
+  return divided && !is_sure(loose, chain.size() - 1) && reject(loose, chain.size() - 1);
+}
+
+/// Ends the waiting of runs.
+void EventChecker::settle(Settle how) {
+  std::vector<std::size_t> chain;
+  do {
+    chain = longestChain(how == Settle::kToConfirmed);
+  } while (rejectLoose(chain, how == Settle::kAtEnd));
+  const std::size_t count = how == Settle::kToMiddle ? runs_.size() / 2 : runs_.size();
+  for (Run& run : runs_) run.wrong = true;
+  for (const std::size_t right : chain) runs_[right].wrong = false;
+  settled_.clear();
+  settled_runs_.assign(std::make_move_iterator(runs_.begin()),
+                       std::make_move_iterator(runs_.begin() + std::ptrdiff_t(count)));
+  for (const Run& run : settled_runs_) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      settled_.push_back({waiting_[i], run.wrong ? &run.problem : nullptr});
+    }
+    if (!run.wrong) newest_ns_ = std::max(newest_ns_, run.max_ns);
+  }
+  const std::size_t events = settled_.size();
+  waiting_.erase(waiting_.begin(), waiting_.begin() + std::ptrdiff_t(events));
+  runs_.erase(runs_.begin(), runs_.begin() + std::ptrdiff_t(count));
+  for (Run& run : runs_) {
+    run.begin -= events;
+    run.end -= events;
+    run.wrong = false;  // more events may show it
+  }
+}
+
+}  // namespace efm

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+
+/// Finds the events of a camera whose times are wrong. They come in bursts: a damaged time word of
+/// a sensor dates hundreds of events.
+///
+/// The rule: an event is late if it is over 10 ms older than the newest one. An event that is over
+/// 10 ms newer begins a pause, and the events behind a pause wait until they are confirmed: 0.1 s
+/// or 2000 of them in order, without another pause. If others come meanwhile that go back into the
+/// pause, not all can be right: those stay that are in order with the confirmed ones, and as many
+/// of them as possible; the rest is wrong. The first and the last events of a stream are wrong if a
+/// pause of over 10 s divides them from the others, they are too few to be confirmed, and no pose
+/// is near. At most 20,000 events wait.
+class EventChecker {
+ public:
+  /// An event whose waiting has ended. `problem` is null if the event is right.
+  struct Settled {
+    Event event;
+    const std::string* problem = nullptr;
+  };
+  enum class Verdict { kWaits, kLate };
+
+  /// Poses from `first_ns` to `last_ns`, on the camera's clock, confirm the first and the last
+  /// events.
+  void expectPoses(std::int64_t first_ns, std::int64_t last_ns) { poses_ns_ = {first_ns, last_ns}; }
+
+  /// Adds an event if it follows the newest one at once, and nothing waits. @return whether it did.
+  bool pass(const Event& event) {
+    const bool near =
+        event.t_ns >= newest_ns_ - kMaxEventDelayNs && event.t_ns <= newest_ns_ + kMaxEventDelayNs;
+    if (!near || !waiting_.empty()) return false;
+    newest_ns_ = std::max(newest_ns_, event.t_ns);
+    return true;
+  }
+  /// Adds any other event. @param problem_of describes what is wrong with its time, given the
+  /// newest time before it.
+  Verdict add(const Event& event, const std::function<std::string(std::int64_t)>& problem_of);
+  /// Returns the events whose waiting ended in the last call, in the order of arrival.
+  std::vector<Settled> takeSettled() { return std::exchange(settled_, {}); }
+  /// Ends the waiting. @param at_end false if the stream is damaged: the last events are right
+  /// then.
+  void finish(bool at_end) { settle(at_end ? Settle::kAtEnd : Settle::kAtDamage); }
+
+  /// Returns the newest time of the last events, also if they wait.
+  std::int64_t lastNs() const { return runs_.empty() ? newest_ns_ : runs_.back().max_ns; }
+
+ private:
+  /// Successive waiting events without a pause.
+  struct Run {
+    std::size_t begin = 0, end = 0;  // in waiting_
+    std::int64_t min_ns = 0, max_ns = 0;
+    std::string problem;  // of its first event
+    bool wrong = false;
+
+    bool isConfirmed() const;
+  };
+  enum class Settle { kToConfirmed, kToMiddle, kAtEnd, kAtDamage };
+
+  bool arePosesNear(const Run& run) const;
+  std::vector<std::size_t> longestChain(bool ends_with_last) const;
+  bool rejectLoose(const std::vector<std::size_t>& chain, bool at_end);
+  void settle(Settle how);
+
+  std::optional<std::pair<std::int64_t, std::int64_t>> poses_ns_;
+  std::int64_t newest_ns_ = -kEndOfTimeNs;
+  std::vector<Event> waiting_;
+  std::vector<Run> runs_;
+  std::vector<Run> settled_runs_;
+  std::vector<Settled> settled_;  // their problems are in settled_runs_
+};
+
+}  // namespace efm
