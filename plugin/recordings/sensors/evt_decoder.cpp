@@ -79,16 +79,35 @@ void setHigh(State& state, std::uint32_t value) {
   state.has_high = true;
 }
 
+/// The register wraps after 16.8 s, so that a damaged word looks like a pause. If the words after a
+/// jump go on from before it, they do so in time, too.
 /// @param value value of a TIME_HIGH, 12 bits.
 inline void setHigh(Evt3State& state, std::uint32_t value) {
   constexpr std::uint64_t kRange = std::uint64_t{1} << 12U;
+  constexpr std::uint64_t kNear = 64;  // 0.26 s
+  constexpr int kMaxWords = 16;
   const bool first = !state.begun;
+  if (state.words_of_jump > 0) {
+    const std::uint64_t on = (value - state.high_before_jump) % kRange;
+    if (on <= kNear) {
+      state.words_of_jump = 0;
+      state.high = state.high_before_jump + on;
+      state.low_time = kRange * state.high;  // the next TIME_LOW belongs to it
+      state.t_ns = kNsPerUs * (kRange * state.high + state.low);
+      return;
+    }
+    state.words_of_jump = (state.words_of_jump + 1) % kMaxWords;
+  }
   const std::uint64_t step = first ? value : (value - state.high) % kRange;
   state.begun = true;
   state.has_high = true;
   if (!first && step == kRange - 1) {
     --state.high;  // valid from the next TIME_LOW
     return;
+  }
+  if (!first && step > kNear && state.words_of_jump == 0) {
+    state.high_before_jump = state.high;
+    state.words_of_jump = 1;
   }
   state.high += step;
   if (step != 0) state.t_ns = kNsPerUs * (kRange * state.high + state.low);

@@ -37,6 +37,8 @@ struct Evt3State {
   bool has_high = false;  ///< True from a TIME_HIGH to the next gap.
   bool has_low = false;
   bool has_y = false;
+  std::uint64_t high_before_jump = 0;
+  int words_of_jump = 0;  ///< TIME_HIGHs since a jump ahead; 0: no jump.
 };
 
 /// The state of DAT between two words.
