@@ -7,17 +7,14 @@
 namespace efm {
 namespace {
 
-// Longer than bursts of wrong times: a time word of a sensor counts for some milliseconds.
-constexpr std::int64_t kConfirmingNs = 100'000'000;
-constexpr std::size_t kConfirmingEvents = 2000;
+// Longer than bursts of wrong times: a time word of a sensor (EVT 3) counts for 4.1 ms.
+constexpr std::int64_t kConfirmingNs = 20'000'000;
 constexpr std::size_t kMaxRuns = 512;
-constexpr std::size_t kMaxWaiting = 20'000;  // many times a burst
+constexpr std::size_t kMaxWaiting = 1'000'000;
 
 }  // namespace
 
-bool EventChecker::Run::isConfirmed() const {
-  return max_ns - min_ns >= kConfirmingNs || end - begin >= kConfirmingEvents;
-}
+bool EventChecker::Run::isConfirmed() const { return max_ns - min_ns >= kConfirmingNs; }
 
 bool EventChecker::arePosesNear(const Run& run) const {
   return poses_ns_ && run.min_ns >= poses_ns_->first - kNanosecondsPerSecond &&
@@ -76,13 +73,10 @@ std::vector<std::size_t> EventChecker::longestChain(bool ends_with_last) const {
 /// the others, and nothing confirms them. @return whether there are any.
 bool EventChecker::rejectLoose(const std::vector<std::size_t>& chain, bool at_end) {
   const auto is_sure = [&](std::size_t first, std::size_t last) {  // runs of the chain, inclusive
-    std::size_t events = 0;
     for (std::size_t i = first; i <= last; ++i) {
       if (arePosesNear(runs_[chain[i]])) return true;
-      events += runs_[chain[i]].end - runs_[chain[i]].begin;
     }
-    return events >= kConfirmingEvents ||
-           runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= kConfirmingNs;
+    return runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= kConfirmingNs;
   };
   const auto is_long = [&](std::int64_t from_ns, std::size_t to) {
     return runs_[chain[to]].min_ns - from_ns > kMaxLastPauseNs;

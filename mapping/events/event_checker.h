@@ -19,12 +19,12 @@ namespace efm {
 /// a sensor dates hundreds of events.
 ///
 /// The rule: an event is late if it is over 10 ms older than the newest one. An event that is over
-/// 10 ms newer begins a pause, and the events behind a pause wait until they are confirmed: 0.1 s
-/// or 2000 of them in order, without another pause. If others come meanwhile that go back into the
-/// pause, not all can be right: those stay that are in order with the confirmed ones, and as many
-/// of them as possible; the rest is wrong. The first and the last events of a stream are wrong if a
-/// pause of over 10 s divides them from the others, they are too few to be confirmed, and no pose
-/// is near. At most 20,000 events wait.
+/// 10 ms newer begins a pause, and the events behind a pause wait until 20 ms of them follow in
+/// order without another pause: longer than a burst lasts. If others come meanwhile that go back
+/// into the pause, not all can be right: those stay that are in order with the confirmed ones, and
+/// as many of them as possible; the rest is wrong. The first and the last events of a stream are
+/// wrong if a pause of over 10 s divides them from the others, they last less than 20 ms, and no
+/// pose is near. At most a million events wait (16 MB).
 class EventChecker {
  public:
   /// An event whose waiting has ended. `problem` is null if the event is right.

@@ -88,10 +88,10 @@ inline void setHigh(Evt3State& state, std::uint32_t value) {
   constexpr int kMaxWords = 16;
   const bool first = !state.begun;
   if (state.words_of_jump > 0) {
-    const std::uint64_t on = (value - state.high_before_jump) % kRange;
-    if (on <= kNear) {
+    const std::uint64_t on = (value - state.high_before_jump + kNear) % kRange;
+    if (on <= 2 * kNear && state.high_before_jump + on >= kNear) {
       state.words_of_jump = 0;
-      state.high = state.high_before_jump + on;
+      state.high = state.high_before_jump + on - kNear;
       state.low_time = kRange * state.high;  // the next TIME_LOW belongs to it
       state.t_ns = kNsPerUs * (kRange * state.high + state.low);
       return;

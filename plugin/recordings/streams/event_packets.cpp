@@ -186,7 +186,7 @@ void EventPackets::takeBlock() {
     if (stopped_) return rejectDisorder();  // errors after this time do not matter
     ++read_events_;
     if (!isPossible(event)) {
-      reject(problemOf(i));
+      reject(needsText() ? problemOf(i) : std::string());
     } else if (checker_.pass(event)) {
       late_in_row_ = 0;
       take(event);
@@ -197,7 +197,7 @@ void EventPackets::takeBlock() {
     } else {
       if (late_events_++ == 0) first_late_ = stream_->positionOf(i);
       if (late_in_row_++ % kBurst == 0) ++late_bursts_;
-      reject(timeProblemOf(i, newest_ns_));
+      reject(needsText() ? timeProblemOf(i, newest_ns_) : std::string());
     }
   }
   if (damage_.empty()) rejectEqualTimes();

@@ -76,6 +76,7 @@ class EventPackets {
   void rejectDisorder();
   std::string inOrder() const;
   void reject(const std::string& problem);
+  bool needsText() const { return bad_ == nullptr || bad_->needsText(); }
   bool isPossible(const Event& event) const;
   std::string problemOf(std::size_t i) const;
   std::string timeProblemOf(std::size_t i, std::int64_t newest_ns) const;

@@ -35,6 +35,8 @@ class BadEvents {
   /// @throws std::runtime_error with the error and the option if the limit is exceeded.
   void skip(const std::string& error);
 
+  /// Returns whether the next call of `skip` needs its text: describing each of many takes long.
+  bool needsText() const { return count_ == 0 || count_ == limit_; }
   std::uint64_t count() const { return count_; }
   /// The error of the first bad event that was found. In a block, lines without an event are found
   /// before wrong events.

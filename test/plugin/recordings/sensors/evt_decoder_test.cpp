@@ -129,12 +129,14 @@ TEST(EvtDecoder, Evt3TimeFollowsBothRegistersAndALateTimeHigh) {
       {"a TIME_HIGH is damaged, and seems ahead",
        {0x6064, kEvent, 0x8206, 0x6002, kEvent, 0x8007, 0x6001, kEvent, 0x8008, 0x6003, kEvent},
        {kBase + 100, (5 + 0x201) * kPeriod + 2, kBase + 2 * kPeriod + 1, kBase + 3 * kPeriod + 3}},
-      {"a TIME_HIGH is damaged, and seems to be after a silence of 16.7 s",
-       {0x6064, kEvent, 0x8002, 0x6ffe, kEvent, 0x8007, 0x6001, kEvent, 0x6003, kEvent},
-       {kBase + 100, (4096 + 3) * kPeriod - 2, kBase + 2 * kPeriod + 1, kBase + 2 * kPeriod + 3}},
-      {"the time wraps, after a silence of 16.7 s and within 4 us",
-       {0x6064, kEvent, 0x8003, 0x6064, kEvent, 0x8fff, 0x6ffe, kEvent, 0x8000, 0x6002, kEvent},
-       {kBase + 100, (4096 + 3) * kPeriod + 100, 8192 * kPeriod - 2, 8192 * kPeriod + 2}},
+      {"the time wraps after a silence of 16.7 s",
+       {0x6064, kEvent, 0x8003, 0x6064, kEvent},
+       {kBase + 100, (4096 + 3) * kPeriod + 100}},
+      {"the time wraps within 4 us, long after a silence",
+       {0x6064, kEvent, 0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff,
+        0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff, 0x8fff,
+        0x8fff, 0x8fff, 0x8fff, 0x6ffe, kEvent, 0x8000, 0x6002, kEvent},
+       {kBase + 100, 4096 * kPeriod - 2, 4096 * kPeriod + 2}},
   };
   for (const Case& one : cases) {
     EvtDecoder decoder(EvtEncoding::kEvt3);
