@@ -13,8 +13,8 @@
 
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/session/map_snapshot.h"
-#include "plugin/session/sample.h"
 #include "plugin/session/session_status.h"
 
 /// @mainpage
@@ -199,7 +199,7 @@ struct Report {
   std::uint64_t points = 0;
   std::vector<Warning> warnings;
   MapQuality quality;
-  std::string json;                 ///< The content of report.json: counts, times, options, …
+  std::string json;  ///< The content of report.json: counts, times, options, …
 };
 
 /// Maps a recording into a folder, as `event-fusion map` does: options that are chosen from the

@@ -17,7 +17,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
 

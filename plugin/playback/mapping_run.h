@@ -15,10 +15,10 @@
 #include "event_fusion/engine.h"
 #include "plugin/playback/error_text.h"
 #include "plugin/playback/progress.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/map_watcher.h"
 #include "plugin/session/recording_statistics.h"
-#include "plugin/session/sample.h"
 
 namespace efm {
 

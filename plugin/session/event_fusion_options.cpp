@@ -4,19 +4,12 @@
 #include <algorithm>
 
 #include "maps/cloud/keyframe_cloud.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
 
 RigSetup readRigSetup(const RigOptions& options) {
-  if (options.setup) return *options.setup;
-  RigSetup setup;
-  if (!options.calibration.empty()) setup.calibration = readCalibration(options.calibration);
-  if (!options.hand_eye.empty()) {
-    setup.T_body_rig = roundedMount(
-        readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr));
-  }
-  return setup;
+  return options.setup ? *options.setup : readRigSetup(options.calibration, options.hand_eye);
 }
 
 void EventFusionOptions::validate() const {

@@ -13,16 +13,10 @@
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
-#include "plugin/recordings/calibration/calibration_file.h"
+#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/session/map_refinement.h"
 
 namespace efm {
-
-/// Content of the files that RigOptions name.
-struct RigSetup {
-  std::optional<Calibration> calibration;
-  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
-};
 
 /// Options of the rig that replace the recording's own.
 struct RigOptions {
@@ -99,7 +93,8 @@ struct EventFusionOptions {
   MapRefinementOptions refinement;
   RigOptions rig;
   LiveOptions live;
-  bool checks = true;  ///< Judge poses, cameras and the map; data that are not used are told always.
+  bool checks =
+      true;  ///< Judge poses, cameras and the map; data that are not used are told always.
   /// Keyframes whose predicted fraction of right depths is lower are left out of the map. 0 to 1.
   double min_keyframe_quality = 0;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.

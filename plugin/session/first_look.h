@@ -9,11 +9,11 @@
 
 #include "mapping/base/text.h"
 #include "mapping/survey/scene_depths.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/map_quality.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/rig_assembly.h"
-#include "plugin/session/sample.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

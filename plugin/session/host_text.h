@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mapping/base/text.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 
@@ -20,6 +21,12 @@ bool& hostIsPython();
 std::string hostText(const std::string& text, HostFace face);
 /// Returns warnings with such texts.
 std::vector<Warning> hostTexts(std::vector<Warning> warnings, HostFace face);
+
+struct Overrides;  // event_fusion/engine.h
+
+/// Returns the recording of a program that gives files and overrides.
+RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
+                         const Overrides& overrides);
 
 template <typename Error>
 [[noreturn]] void rethrowForHost(const Error& error, HostFace face) {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/pose_source_selector.h"
-#include "plugin/session/sample.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

@@ -22,11 +22,11 @@
 #include "event_fusion/engine.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 #include "plugin/session/recording_statistics.h"
-#include "plugin/session/sample.h"
 
 namespace efm {
 

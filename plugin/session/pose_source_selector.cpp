@@ -4,14 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "mapping/base/text.h"
-
 namespace efm {
-
-std::string asText(const PoseSourceId& source) {
-  if (source.kind == PoseKind::kActions) return "actions";
-  return (source.kind == PoseKind::kPose ? "poses " : "odometry ") + inQuotes(source.label);
-}
 
 std::vector<StampedPose> PoseSourceSelector::add(const PoseSourceId& source,
                                                  const StampedPose& pose) {

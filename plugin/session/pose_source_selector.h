@@ -6,36 +6,13 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
-
-/// Kinds of pose sources, the best first.
-enum class PoseKind {
-  kPose,      ///< Poses in the world.
-  kOdometry,  ///< Wheel odometry in the plane; it drifts.
-  kActions,   ///< Composed movements; they drift.
-};
-
-/// Source of poses: its kind, and the label of its sensor.
-struct PoseSourceId {
-  PoseKind kind = PoseKind::kPose;
-  std::string label;
-
-  friend bool operator<(const PoseSourceId& a, const PoseSourceId& b) {
-    return std::tie(a.kind, a.label) < std::tie(b.kind, b.label);
-  }
-  friend bool operator==(const PoseSourceId& a, const PoseSourceId& b) {
-    return a.kind == b.kind && a.label == b.label;
-  }
-};
-
-/// Returns "odometry 'wheels'", for messages.
-std::string asText(const PoseSourceId& source);
 
 /// Selects the poses of one source and counts the poses of other sources. The poses of two sources
 /// are never mixed: they refer to different worlds, or one source is worse.

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "plugin/recordings/streams/sample.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/sample.h"
 
 namespace efm {
 

@@ -9,7 +9,7 @@
 #include "mapping/events/window.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/streams/recording_parts.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
 

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "plugin/recordings/streams/recording_parts.h"
-#include "plugin/session/map_snapshot.h"
-#include "plugin/session/map_watcher.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
+
+class MapWatcher;
+struct StoredKeyframe;
 
 class RawlogWriter {
  public:

@@ -10,7 +10,6 @@
 #include <system_error>
 #include <utility>
 
-#include "event_fusion/engine.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/joined_recording.h"
 #include "plugin/recordings/open/mrpt_library.h"
@@ -20,7 +19,6 @@
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
-#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {
@@ -459,10 +457,7 @@ RigSetup readRigSetup(const RecordingSource& source) {
   if (source.setup) return *source.setup;
   requireGivenFile(source.calibration, "--calibration", source.calibration_given);
   requireGivenFile(source.hand_eye, "--hand-eye", source.hand_eye_given);
-  RigOptions files;
-  files.calibration = source.calibration;
-  files.hand_eye = source.hand_eye;
-  return readRigSetup(files);
+  return readRigSetup(source.calibration, source.hand_eye);
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
@@ -521,66 +516,6 @@ std::vector<TimedFile> openTruth(const RecordingSource& source) {
     truth.insert(truth.end(), found.begin(), found.end());
   }
   return truth;
-}
-
-namespace {
-
-/// The recording of a program, whose errors name Overrides.
-class HostRecording : public Recording {
- public:
-  explicit HostRecording(std::unique_ptr<Recording> of) : of_(std::move(of)) {}
-  std::optional<Sample> read() override {
-    return forHost(HostFace::kRecording, [this] { return of_->read(); });
-  }
-  std::string damage() const override { return hostText(of_->damage(), HostFace::kRecording); }
-  const Rig& rig() const override { return of_->rig(); }
-  std::string position() const override { return of_->position(); }
-  double progress() const override { return of_->progress(); }
-  RecordingCounts counts() const override {
-    RecordingCounts counts = of_->counts();
-    counts.warnings = hostTexts(std::move(counts.warnings), HostFace::kRecording);
-    counts.notes = hostTexts(std::move(counts.notes), HostFace::kRecording);
-    return counts;
-  }
-
- private:
-  std::unique_ptr<Recording> of_;
-};
-
-}  // namespace
-
-std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path>& files,
-                                         const Overrides& overrides) {
-  return forHost(HostFace::kRecording, [&] {
-    return std::make_unique<HostRecording>(openRecording(sourceOf(files, overrides)));
-  });
-}
-
-RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
-                         const Overrides& overrides) {
-  overrides.limits.validate();
-  const auto given = [](const char* name, const Path& file) {
-    return file.empty() ? std::string() : name + (" " + file.string());
-  };
-  RecordingSource source;
-  source.files = files;
-  source.poses = overrides.poses;
-  source.calibration = overrides.calibration;
-  source.hand_eye = overrides.hand_eye;
-  source.calibration_given = given("calibration", overrides.calibration);
-  source.hand_eye_given = given("hand_eye", overrides.hand_eye);
-  source.limits = overrides.limits;
-  source.format = overrides.format;
-  source.reader.topics = overrides.topics;
-  source.reader.columns = overrides.event_columns;
-  source.reader.time_unit = overrides.time_unit;
-  source.reader.pose_time_unit = overrides.pose_time_unit;
-  if (overrides.sensor_size) {
-    source.reader.sensor_size = {overrides.sensor_size->first, overrides.sensor_size->second};
-  }
-  source.skip_bad_events = overrides.skip_bad_events;
-  source.cameras = overrides.cameras;
-  return source;
 }
 
 }  // namespace efm

@@ -10,8 +10,7 @@
 #include "mapping/events/window.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/streams/recording_parts.h"
-#include "plugin/session/event_fusion_options.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {
@@ -55,12 +54,6 @@ std::vector<std::string> recordingFormats();
 /// are put together in the order of the files. Applies the given calibration, hand-eye transform
 /// and time offsets: nothing changes the rig afterwards.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
-
-struct Overrides;  // event_fusion/engine.h
-
-/// Returns the recording of a program that gives files and overrides.
-RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
-                         const Overrides& overrides);
 
 /// Returns the depth maps of the recording's truth, for formats with `RecordingFormat::truth`.
 /// Opens no events.

@@ -20,7 +20,7 @@
 #include "mapping/events/event.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 namespace efm {
 
@@ -160,6 +160,16 @@ struct RecordingParts {
   std::string expected_calibration = "a calibration in the recording";
   std::string expected_poses = "poses in the recording";
 };
+
+/// The content of the files that replace parts of the rig.
+struct RigSetup {
+  std::optional<Calibration> calibration;
+  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
+};
+
+/// Reads the files that are given. @throws std::runtime_error naming a file that cannot be read.
+RigSetup readRigSetup(const std::filesystem::path& calibration,
+                      const std::filesystem::path& hand_eye);
 
 /// Choices that a reader cannot find in the file.
 struct ReaderOptions {

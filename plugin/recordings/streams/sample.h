@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -15,9 +16,31 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
-#include "plugin/session/pose_source_selector.h"
 
 namespace efm {
+
+/// Kinds of pose sources, the best first.
+enum class PoseKind {
+  kPose,      ///< Poses in the world.
+  kOdometry,  ///< Wheel odometry in the plane; it drifts.
+  kActions,   ///< Composed movements; they drift.
+};
+
+/// Source of poses: its kind, and the label of its sensor.
+struct PoseSourceId {
+  PoseKind kind = PoseKind::kPose;
+  std::string label;
+
+  friend bool operator<(const PoseSourceId& a, const PoseSourceId& b) {
+    return std::tie(a.kind, a.label) < std::tie(b.kind, b.label);
+  }
+  friend bool operator==(const PoseSourceId& a, const PoseSourceId& b) {
+    return a.kind == b.kind && a.label == b.label;
+  }
+};
+
+/// Returns "odometry 'wheels'", for messages.
+std::string asText(const PoseSourceId& source);
 
 /// Events of one camera in an interval of time.
 struct EventPacket {

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/sample.h"
+#include "plugin/recordings/streams/sample.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
+
+std::string asText(const PoseSourceId& source) {
+  if (source.kind == PoseKind::kActions) return "actions";
+  return (source.kind == PoseKind::kPose ? "poses " : "odometry ") + inQuotes(source.label);
+}
 
 std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
   const auto within = [](std::int64_t t) { return std::clamp(t, -kEndOfTimeNs, kEndOfTimeNs); };
@@ -52,6 +59,17 @@ Rigid3 roundedPose(const Rigid3& T_a_b) {
   }
   q[large] = std::sqrt(rest);
   return {{q[0], q[1], q[2], q[3]}, T_a_b.translation};
+}
+
+RigSetup readRigSetup(const std::filesystem::path& calibration,
+                      const std::filesystem::path& hand_eye) {
+  RigSetup setup;
+  if (!calibration.empty()) setup.calibration = readCalibration(calibration);
+  if (!hand_eye.empty()) {
+    setup.T_body_rig =
+        roundedMount(readHandEye(hand_eye, setup.calibration ? &*setup.calibration : nullptr));
+  }
+  return setup;
 }
 
 Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {
