@@ -21,14 +21,13 @@ bool EventChecker::arePosesNear(const Run& run) const {
          run.max_ns <= poses_ns_->second + kNanosecondsPerSecond;
 }
 
-EventChecker::Verdict EventChecker::add(
-    const Event& event, const std::function<std::string(std::int64_t)>& problem_of) {
+EventChecker::Verdict EventChecker::add(const Event& event, std::uint64_t number) {
   const std::int64_t t_ns = event.t_ns;
   if (t_ns < newest_ns_ - kMaxEventDelayNs) return Verdict::kLate;
   const bool follows = !runs_.empty() && t_ns >= runs_.back().max_ns - kMaxEventDelayNs &&
                        t_ns <= runs_.back().max_ns + kMaxEventDelayNs;
   if (!follows) {
-    runs_.push_back({waiting_.size(), 0, t_ns, t_ns, problem_of(lastNs())});
+    runs_.push_back({waiting_.size(), 0, t_ns, t_ns, number, lastNs()});
   }
   waiting_.push_back(event);
   Run& run = runs_.back();
@@ -40,7 +39,7 @@ EventChecker::Verdict EventChecker::add(
   } else if (runs_.size() == kMaxRuns || waiting_.size() == kMaxWaiting) {
     settle(Settle::kToMiddle);
   }
-  return Verdict::kWaits;
+  return follows ? Verdict::kWaits : Verdict::kBeginsRun;
 }
 
 /// Returns the runs that are in order and have the most events together.
@@ -107,17 +106,16 @@ void EventChecker::settle(Settle how) {
   for (Run& run : runs_) run.wrong = true;
   for (const std::size_t right : chain) runs_[right].wrong = false;
   settled_.clear();
-  settled_runs_.assign(std::make_move_iterator(runs_.begin()),
-                       std::make_move_iterator(runs_.begin() + std::ptrdiff_t(count)));
-  for (const Run& run : settled_runs_) {
-    for (std::size_t i = run.begin; i < run.end; ++i) {
-      settled_.push_back({waiting_[i], run.wrong ? &run.problem : nullptr});
+  const auto end = runs_.begin() + static_cast<std::ptrdiff_t>(count);
+  for (auto run = runs_.begin(); run != end; ++run) {
+    for (std::size_t i = run->begin; i < run->end; ++i) {
+      settled_.push_back({waiting_[i], run->wrong, run->first, run->before_ns});
     }
-    if (!run.wrong) newest_ns_ = std::max(newest_ns_, run.max_ns);
+    if (!run->wrong) newest_ns_ = std::max(newest_ns_, run->max_ns);
   }
   const std::size_t events = settled_.size();
-  waiting_.erase(waiting_.begin(), waiting_.begin() + std::ptrdiff_t(events));
-  runs_.erase(runs_.begin(), runs_.begin() + std::ptrdiff_t(count));
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(events));
+  runs_.erase(runs_.begin(), end);
   for (Run& run : runs_) {
     run.begin -= events;
     run.end -= events;

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -27,12 +25,14 @@ namespace efm {
 /// pose is near. At most a million events wait (16 MB).
 class EventChecker {
  public:
-  /// An event whose waiting has ended. `problem` is null if the event is right.
+  /// An event whose waiting has ended.
   struct Settled {
     Event event;
-    const std::string* problem = nullptr;
+    bool wrong = false;
+    std::uint64_t first = 0;     ///< Number of the first event since the last pause or step back.
+    std::int64_t before_ns = 0;  ///< Newest time before that one; -kEndOfTimeNs at the beginning.
   };
-  enum class Verdict { kWaits, kLate };
+  enum class Verdict { kBeginsRun, kWaits, kLate };
 
   /// Poses from `first_ns` to `last_ns`, on the camera's clock, confirm the first and the last
   /// events.
@@ -46,9 +46,9 @@ class EventChecker {
     newest_ns_ = std::max(newest_ns_, event.t_ns);
     return true;
   }
-  /// Adds any other event. @param problem_of describes what is wrong with its time, given the
-  /// newest time before it.
-  Verdict add(const Event& event, const std::function<std::string(std::int64_t)>& problem_of);
+  /// Adds any other event. kBeginsRun: it waits, as the first one behind a pause or a step back.
+  /// @param number of the event, for `Settled`.
+  Verdict add(const Event& event, std::uint64_t number);
   /// Returns the events whose waiting ended in the last call, in the order of arrival.
   std::vector<Settled> takeSettled() { return std::exchange(settled_, {}); }
   /// Ends the waiting. @param at_end false if the stream is damaged: the last events are right
@@ -63,7 +63,8 @@ class EventChecker {
   struct Run {
     std::size_t begin = 0, end = 0;  // in waiting_
     std::int64_t min_ns = 0, max_ns = 0;
-    std::string problem;  // of its first event
+    std::uint64_t first = 0;     // as in Settled
+    std::int64_t before_ns = 0;  // as in Settled
     bool wrong = false;
 
     bool isConfirmed() const;
@@ -79,8 +80,7 @@ class EventChecker {
   std::int64_t newest_ns_ = -kEndOfTimeNs;
   std::vector<Event> waiting_;
   std::vector<Run> runs_;
-  std::vector<Run> settled_runs_;
-  std::vector<Settled> settled_;  // their problems are in settled_runs_
+  std::vector<Settled> settled_;
 };
 
 }  // namespace efm

@@ -254,14 +254,22 @@ class PropheseeRawStream : public EventStream {
     block_byte_ = start_byte;
   }
   std::string positionOf(std::size_t index) const override {
-    EvtDecoder decoder = at_block_;
-    std::vector<Event> events;
+    // Many words at once, then the word.
     std::size_t at = 0;
-    while (at < block_.size()) {
-      const std::size_t word = std::min(decoder.wordBytes(), block_.size() - at);
-      decoder.decode(block_.data() + at, word, events);
-      if (events.size() > index) break;
-      at += word;
+    EvtDecoder at_word = at_block_;
+    std::size_t events_before = 0;
+    for (const std::size_t words : {std::size_t{4096}, std::size_t{1}}) {
+      EvtDecoder decoder = at_word;
+      std::vector<Event> events;
+      while (at < block_.size()) {
+        const std::size_t bytes = std::min(words * decoder.wordBytes(), block_.size() - at);
+        decoder.decode(block_.data() + at, bytes, events);
+        if (events_before + events.size() > index) break;
+        events_before += events.size();
+        events.clear();
+        at_word = decoder;
+        at += bytes;
+      }
     }
     return fmt::format("{}: byte {}", file_.string(), block_byte_ + at);
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -123,20 +124,30 @@ std::string EventPackets::problemOf(std::size_t i) const {
   return problem("t", event.t_ns, "a time in ns before the year 2116");
 }
 
-/// Describes the wrong time of an event of the block. @param newest_ns of the events before it.
-std::string EventPackets::timeProblemOf(std::size_t i, std::int64_t newest_ns) const {
-  const std::int64_t t_ns = block_[i].t_ns;
-  std::string expected = "a time near those of the events after it" + inOrder();
+/// Describes a wrong time. The place of a few events is noted, that of others is known as long as
+/// their block.
+/// @param number of the event. @param newest_ns of the events before it.
+std::string EventPackets::timeProblemOf(std::int64_t t_ns, std::uint64_t number,
+                                        std::int64_t newest_ns) const {
+  const auto noted = places_.find(number);
+  const bool in_block = number >= block_begin_ && number - block_begin_ < block_.size();
+  const std::string place =
+      noted != places_.end() ? noted->second
+      : in_block             ? stream_->positionOf(static_cast<std::size_t>(number - block_begin_))
+                             : stream_->name();
+  const std::string command = stream_->commandInOrder();
+  const std::string sorts =
+      command.empty() ? "" : "; if they are not in order, this sorts them: " + command;
+  std::string expected = "a time near those of the events after it" + sorts;
   if (newest_ns > t_ns) {
     expected = fmt::format("events in time order, at most 10 ms before the newest ({}){}",
                            formatSeconds(newest_ns), inOrder());
   } else if (newest_ns != -kEndOfTimeNs) {
     expected =
         fmt::format("a time near those of the events beside it, of which the one before is at {}{}",
-                    formatSeconds(newest_ns), inOrder());
+                    formatSeconds(newest_ns), sorts);
   }
-  return fmt::format("{}: t = '{}': expected {}", stream_->positionOf(i), formatSeconds(t_ns),
-                     expected);
+  return fmt::format("{}: t = '{}': expected {}", place, formatSeconds(t_ns), expected);
 }
 
 /// Returns what sorts the events, for errors.
@@ -154,10 +165,15 @@ void EventPackets::rejectDisorder() {
   const bool enough = at_end || read_events_ >= kEnough;
   if (!enough || late_bursts_ < kFew || share * late_events_ <= read_events_) return;
   if (read_events_ <= block_.size()) events_.clear();  // none of them was used yet
+  endInDisorder(late_events_, read_events_, first_late_);
+}
+
+void EventPackets::endInDisorder(std::uint64_t late, std::uint64_t of, const std::string& first) {
   damage_ = fmt::format(
       "{}: {} of {} events are over 10 ms late, first {}: expected events in time order{}; "
       "--skip-bad-events is for at most 1 % of late events",
-      stream_->name(), late_events_, read_events_, first_late_, inOrder());
+      stream_->name(), late, of, first, inOrder());
+  checker_ = {};  // what waits is of no use
 }
 
 void EventPackets::take(const Event& event) {
@@ -180,24 +196,28 @@ void EventPackets::take(const Event& event) {
 
 void EventPackets::takeBlock() {
   constexpr std::uint64_t kBurst = 1000;
+  constexpr std::size_t kMaxPlaces = 16;  // some formats find them slowly
   events_.reserve(events_.size() + block_.size());
+  block_begin_ = read_events_;
   for (std::size_t i = 0; i < block_.size() && damage_.empty(); ++i) {
     const Event& event = block_[i];
     if (stopped_) return rejectDisorder();  // errors after this time do not matter
-    ++read_events_;
+    const std::uint64_t number = read_events_++;
     if (!isPossible(event)) {
       reject(needsText() ? problemOf(i) : std::string());
     } else if (checker_.pass(event)) {
       late_in_row_ = 0;
       take(event);
-    } else if (checker_.add(event, [&](auto newest_ns) { return timeProblemOf(i, newest_ns); }) ==
-               EventChecker::Verdict::kWaits) {
+    } else if (const auto verdict = checker_.add(event, number);
+               verdict != EventChecker::Verdict::kLate) {
       late_in_row_ = 0;
+      const bool begins = verdict == EventChecker::Verdict::kBeginsRun;
+      if (begins && places_.size() < kMaxPlaces) places_.emplace(number, stream_->positionOf(i));
       takeSettled();
     } else {
       if (late_events_++ == 0) first_late_ = stream_->positionOf(i);
       if (late_in_row_++ % kBurst == 0) ++late_bursts_;
-      reject(needsText() ? timeProblemOf(i, newest_ns_) : std::string());
+      reject(needsText() ? timeProblemOf(event.t_ns, number, newest_ns_) : std::string());
     }
   }
   if (damage_.empty()) rejectEqualTimes();
@@ -207,17 +227,42 @@ void EventPackets::takeBlock() {
 /// Takes the events whose times are known to be right now, and rejects the others.
 void EventPackets::takeSettled() {
   const bool ends = !damage_.empty();
-  const std::string* burst = nullptr;
-  for (const auto& [event, problem] : checker_.takeSettled()) {
+  std::optional<std::uint64_t> burst;
+  const std::vector<EventChecker::Settled> settled = checker_.takeSettled();
+  if (!ends && isDisorder(settled)) return;
+  for (const auto& [event, wrong, first, before_ns] : settled) {
     if (stopped_ || (!ends && !damage_.empty())) return;
-    if (problem == nullptr) {
+    if (!wrong) {
       take(event);
     } else if (!ends && event.t_ns - kMaxEventDelayNs < stop_ns_) {
-      if (late_events_++ == 0) first_late_ = problem->substr(0, problem->find(": t = "));
-      if (std::exchange(burst, problem) != problem) ++late_bursts_;
-      reject(*problem);
+      const std::string problem =
+          needsText() ? timeProblemOf(event.t_ns, first, before_ns) : std::string();
+      if (late_events_++ == 0) first_late_ = problem.substr(0, problem.find(": t = "));
+      if (std::exchange(burst, first) != first) ++late_bursts_;
+      reject(problem);
     }
   }
+  if (!settled.empty()) {
+    places_.erase(places_.begin(), places_.upper_bound(settled.back().first));
+  }
+}
+
+/// Returns whether most of the events that waited are wrong, and not in a few bursts: damage.
+bool EventPackets::isDisorder(const std::vector<EventChecker::Settled>& settled) {
+  constexpr std::size_t kFew = 10;
+  const EventChecker::Settled* first = nullptr;
+  std::set<std::uint64_t> bursts;
+  std::uint64_t wrong = 0;
+  for (const EventChecker::Settled& event : settled) {
+    if (!event.wrong) continue;
+    ++wrong;
+    if (first == nullptr) first = &event;
+    if (bursts.size() < kFew) bursts.insert(event.first);
+  }
+  if (bursts.size() < kFew || 2 * wrong <= settled.size()) return false;
+  const std::string problem = timeProblemOf(first->event.t_ns, first->first, first->before_ns);
+  endInDisorder(wrong, settled.size(), problem.substr(0, problem.find(": t = ")));
+  return true;
 }
 
 /// Counts in whole blocks, which costs nothing: too many events of one time fill several blocks.

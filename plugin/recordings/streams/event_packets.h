@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -74,12 +75,14 @@ class EventPackets {
   void takeSettled();
   void rejectEqualTimes();
   void rejectDisorder();
+  void endInDisorder(std::uint64_t late, std::uint64_t of, const std::string& first);
+  bool isDisorder(const std::vector<EventChecker::Settled>& settled);
   std::string inOrder() const;
   void reject(const std::string& problem);
   bool needsText() const { return bad_ == nullptr || bad_->needsText(); }
   bool isPossible(const Event& event) const;
   std::string problemOf(std::size_t i) const;
-  std::string timeProblemOf(std::size_t i, std::int64_t newest_ns) const;
+  std::string timeProblemOf(std::int64_t t_ns, std::uint64_t number, std::int64_t newest_ns) const;
 
   std::unique_ptr<EventStream> stream_;
   CameraSize size_;
@@ -89,6 +92,7 @@ class EventPackets {
   std::int64_t stop_ns_ = kEndOfTimeNs;
   std::optional<std::int64_t> before_ns_, after_ns_;
   std::uint64_t read_events_ = 0;
+  std::uint64_t block_begin_ = 0;  // number of the block's first event
   std::uint64_t late_events_ = 0;  // over 10 ms
   std::uint64_t late_bursts_ = 0;  // successive ones, at most 1000
   std::uint64_t late_in_row_ = 0;
@@ -104,6 +108,7 @@ class EventPackets {
   std::int64_t equal_times_ = 0;  // number of events at equal_ns_, in the last blocks
   std::int64_t equal_ns_ = 0;
   EventChecker checker_;
+  std::map<std::uint64_t, std::string> places_;  // of some waiting events, by their numbers
   bool disordered_ = false;
   std::uint64_t sorted_events_ = 0;
 };
