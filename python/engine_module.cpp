@@ -47,9 +47,10 @@ class EventReader {
       const Released released;
       const std::lock_guard<std::mutex> lock(mutex_);
       while (waiting_.size() < count && readPacket(camera)) checkSignals();
-      if (const std::string damage = recording_->damage();
-          ended_ && waiting_.empty() && !damage.empty())
-        throw std::runtime_error(damage);
+      if (waiting_.empty()) {  // the recording has ended
+        const std::string damage = recording_->damage();
+        if (!damage.empty()) throw std::runtime_error(damage);
+      }
       const auto end =
           waiting_.begin() + static_cast<std::ptrdiff_t>(std::min(count, waiting_.size()));
       part.assign(waiting_.begin(), end);
@@ -61,8 +62,7 @@ class EventReader {
  private:
   bool readPacket(int camera) {
     const std::optional<Sample> sample = recording_->read();
-    ended_ = !sample;
-    if (ended_) return false;
+    if (!sample) return false;
     const auto* packet = std::get_if<EventPacket>(&*sample);
     if (packet != nullptr && packet->camera == camera) {
       waiting_.insert(waiting_.end(), packet->events.begin(), packet->events.end());
@@ -73,7 +73,6 @@ class EventReader {
   std::mutex mutex_;  // several threads may take turns
   std::unique_ptr<Recording> recording_;
   std::vector<Event> waiting_;
-  bool ended_ = false;
 };
 
 /// Returns the time of a recording's first event, of any camera.

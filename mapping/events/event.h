@@ -56,8 +56,8 @@ class EventSpan {
 /// sorted into place and counted.
 inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
 
-/// An event or pose farther than kFarAheadNs ahead of its stream is wrong if the next sample goes
-/// back. The last sample of a stream is wrong if it is farther than kMaxLastPauseNs ahead.
+/// Beside a sensor, an event or pose farther than kFarAheadNs ahead of its stream is wrong if the
+/// next one goes back. What is last and farther than kMaxLastPauseNs ahead is wrong anywhere.
 inline constexpr std::int64_t kFarAheadNs = 1'000'000'000;
 inline constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
 

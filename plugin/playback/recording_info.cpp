@@ -84,10 +84,8 @@ RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>
   }
   info.error = recording->damage();
   info.counts = recording->counts();
-  const bool limited = source.limits.t0_ns || source.limits.t1_ns;
-  if (info.error.empty() && !info.statistics.eventSpan() && limited &&
-      !recording->rig().cameras.empty()) {
-    info.error = noEventText(source.limits, info.counts);
+  if (info.error.empty() && !info.statistics.eventSpan()) {
+    info.error = limitsWithoutEvents(source.limits, *recording);
   }
   info.true_depth_maps = openTruth(source).size();
   if (info.error.empty()) judge(takes ? &look : nullptr, info);
@@ -130,9 +128,14 @@ std::string infoJson(const RecordingInfo& info) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string limitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
+  if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return {};
+  return noEventText(limits, recording.counts());
+}
+
 void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
-  if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
-  throw std::runtime_error(noEventText(limits, recording.counts()));
+  const std::string error = limitsWithoutEvents(limits, recording);
+  if (!error.empty()) throw std::runtime_error(error);
 }
 
 }  // namespace efm

@@ -41,8 +41,10 @@ RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>
 /// chosen, warnings and notes.
 std::string infoJson(const RecordingInfo& info);
 
-/// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
-/// @param recording was read, and had no event.
+/// Returns the error of time limits without events: they may be mistyped. Empty without limits, and
+/// for a recording without cameras. @param recording was read, and had no event.
+std::string limitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
+/// Throws that error, if there is one.
 void rejectLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
 
 }  // namespace efm

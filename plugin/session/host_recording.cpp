@@ -15,9 +15,7 @@ namespace {
 class HostRecording : public Recording {
  public:
   explicit HostRecording(std::unique_ptr<Recording> of) : of_(std::move(of)) {}
-  std::optional<Sample> read() override {
-    return forHost(HostFace::kRecording, [this] { return of_->read(); });
-  }
+  std::optional<Sample> read() override { return of_->read(); }
   std::string damage() const override { return hostText(of_->damage(), HostFace::kRecording); }
   const Rig& rig() const override { return of_->rig(); }
   std::string position() const override { return of_->position(); }

@@ -78,11 +78,12 @@ class JoinedRecording : public Recording {
     return *std::exchange(packet_, std::nullopt);
   }
 
-  /// Damage at which the recording ended comes first.
+  /// Damage at which the recording ended comes first. What lies behind the limits is none, unless
+  /// all streams of the file share it.
   std::string damage() const override {
     std::string damage = damaged_ ? parts_.cameras[*damaged_].damage() : parts_.poses_damage;
     for (const EventPackets& camera : parts_.cameras) {
-      if (damage.empty()) damage = camera.stream().damage();
+      if (damage.empty() && camera.stream().sharesDamage()) damage = camera.stream().damage();
     }
     return damage;
   }

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -12,6 +11,11 @@
 #include "mapping/events/event.h"
 
 namespace efm {
+namespace {
+
+constexpr std::uint64_t kFewBursts = 10;  // of wrong times: fewer are no disorder of the file
+
+}  // namespace
 
 void BadEvents::skip(const std::string& error) {
   if (count_ == limit_) {
@@ -159,11 +163,10 @@ std::string EventPackets::inOrder() const {
 /// Rejects events of which many are late: without them, the rest would be a wrong recording.
 void EventPackets::rejectDisorder() {
   constexpr std::uint64_t kEnough = 1000;
-  constexpr std::uint64_t kFew = 10;
   const bool at_end = ended_ || stopped_;
   const std::uint64_t share = at_end ? 100 : 5;
   const bool enough = at_end || read_events_ >= kEnough;
-  if (!enough || late_bursts_ < kFew || share * late_events_ <= read_events_) return;
+  if (!enough || late_bursts_ < kFewBursts || share * late_events_ <= read_events_) return;
   if (read_events_ <= block_.size()) events_.clear();  // none of them was used yet
   endInDisorder(late_events_, read_events_, first_late_);
 }
@@ -235,8 +238,9 @@ void EventPackets::takeSettled() {
     if (!wrong) {
       take(event);
     } else if (!ends && event.t_ns - kMaxEventDelayNs < stop_ns_) {
+      const bool told = needsText() || late_events_ == 0;
       const std::string problem =
-          needsText() ? timeProblemOf(event.t_ns, first, before_ns) : std::string();
+          told ? timeProblemOf(event.t_ns, first, before_ns) : std::string();
       if (late_events_++ == 0) first_late_ = problem.substr(0, problem.find(": t = "));
       if (std::exchange(burst, first) != first) ++late_bursts_;
       reject(problem);
@@ -249,17 +253,17 @@ void EventPackets::takeSettled() {
 
 /// Returns whether most of the events that waited are wrong, and not in a few bursts: damage.
 bool EventPackets::isDisorder(const std::vector<EventChecker::Settled>& settled) {
-  constexpr std::size_t kFew = 10;
   const EventChecker::Settled* first = nullptr;
-  std::set<std::uint64_t> bursts;
+  std::optional<std::uint64_t> burst;
+  std::uint64_t bursts = 0;
   std::uint64_t wrong = 0;
   for (const EventChecker::Settled& event : settled) {
     if (!event.wrong) continue;
     ++wrong;
     if (first == nullptr) first = &event;
-    if (bursts.size() < kFew) bursts.insert(event.first);
+    if (std::exchange(burst, event.first) != event.first) ++bursts;
   }
-  if (bursts.size() < kFew || 2 * wrong <= settled.size()) return false;
+  if (bursts < kFewBursts || 2 * wrong <= settled.size()) return false;
   const std::string problem = timeProblemOf(first->event.t_ns, first->first, first->before_ns);
   endInDisorder(wrong, settled.size(), problem.substr(0, problem.find(": t = ")));
   return true;

@@ -210,6 +210,18 @@ TEST_F(JoinedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
   EXPECT_THAT(error, HasSubstr("cam0/events.txt:3: '0.019 0 0'"));
 }
 
+TEST_F(JoinedRecordingTest, DamageBehindTheIntervalIsNone) {
+  std::string text;
+  for (int i = 0; i < 200; ++i) text += fmt::format("{:.3f} 1 2 0\n", 1e-3 * i);
+  const auto recording = join(parts({text + "damage\n"}), {std::nullopt, 50 * kMs});
+  std::uint64_t events = 0;
+  for (const Sample& sample : readAll(*recording)) {
+    events += std::get<EventPacket>(sample).events.size();
+  }
+  EXPECT_EQ(events, 50U);
+  EXPECT_EQ(recording->damage(), "");
+}
+
 /// A camera whose file reports lost events.
 struct LossyStream : EventStream {
   explicit LossyStream(std::uint64_t packets) : lost(packets) {}
