@@ -10,13 +10,13 @@
 
 /// Stands for a driver: sends each sample at its time.
 void feed(efm::Recording& recording, efm::Mapper& mapper) {
+  mapper.addCameras(recording.rig());
   const auto begin = std::chrono::steady_clock::now();
   std::int64_t first_ns = -1;
   while (auto sample = recording.next()) {
     const auto* pose = std::get_if<efm::PoseSample>(&*sample);
     const auto* packet = std::get_if<efm::EventPacket>(&*sample);
-    const bool has_events = packet && !packet->events.empty();
-    if (pose || has_events) {
+    if (pose || packet) {
       const std::int64_t t_ns = pose ? pose->t_ns : packet->events.back().t_ns;
       if (first_ns < 0) first_ns = t_ns;
       std::this_thread::sleep_until(begin + std::chrono::nanoseconds(t_ns - first_ns));

@@ -35,7 +35,7 @@ int main(int argc, char** argv) try {
       std::vector<efm::Event>& all = events[packet->camera];
       all.insert(all.end(), packet->events.begin(), packet->events.end());
     } else if (const auto* pose = std::get_if<efm::PoseSample>(&*sample)) {
-      poses.push_back({pose->t_ns, pose->T_world_body * pose->T_body_rig});
+      poses.push_back({pose->t_ns, pose->T_world_rig()});
     }
   }
   const auto map = mapOf(recording->rig().cameras, std::move(events), poses);

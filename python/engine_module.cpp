@@ -90,7 +90,7 @@ std::vector<StampedPose> readPoses(const RecordingSource& source) {
   std::vector<StampedPose> poses;
   while (const auto sample = recording->next()) {
     if (const auto* pose = std::get_if<PoseSample>(&*sample)) {
-      poses.push_back({pose->t_ns, rigPose(*pose, std::nullopt)});
+      poses.push_back({pose->t_ns, pose->T_world_rig()});
     }
   }
   return poses;
@@ -131,6 +131,7 @@ MapperPointer makeMapper(const Options& options, const OnKeyframe& on_keyframe,
 
 void addRecording(Mapper& mapper, const RecordingSource& source) {
   const auto recording = openRecording(source);
+  mapper.addCameras(recording->rig());
   while (auto sample = recording->next()) {
     mapper.add(std::move(*sample));
     checkSignals();

@@ -130,6 +130,7 @@ RigArrays rigArraysOf(const std::vector<RigCamera>& cameras, const std::vector<E
   RigArrays arrays{{cameras}, {}, stampedPoses(times_ns, T_world_rig)};
   for (std::size_t camera = 0; camera < events.size(); ++camera) {
     std::vector<Event>& all = arrays.events.emplace_back(eventsOf(events[camera]));
+    requirePossible(all, static_cast<int>(camera), cameras[camera]);
     for (Event& event : all) event.t_ns += cameras[camera].time_offset_ns;
     const auto earlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
     if (!std::is_sorted(all.begin(), all.end(), earlier)) {

@@ -142,7 +142,8 @@ class Mapper {
   /// @throws std::invalid_argument if a value is not valid; std::logic_error after `addEvents`.
   int addCamera(const RigCamera& camera);
   /// Adds the next events of a camera, on the camera's clock. Events that are up to 10 ms out of
-  /// order are sorted. After an error, no event of this call is added.
+  /// order are sorted. Bursts of events with a time far ahead are left out, and `warnings` tells
+  /// their number. After an error, no event of this call is added.
   /// @throws std::invalid_argument if an event is outside the sensor or older than that, or if
   /// there is no such camera.
   void addEvents(int camera, std::vector<Event> events);
@@ -156,6 +157,11 @@ class Mapper {
 
   // Samples of a recording.
 
+  /// Adds the cameras of a recording: `addCameras(recording->rig())`, before its samples. Further
+  /// recordings must have the same cameras.
+  /// @throws std::invalid_argument if the cameras do not fit the options, or differ from cameras
+  /// that were added before.
+  void addCameras(const Rig& rig);
   /// Adds a packet of events or a pose; an OtherSample is ignored.
   /// @throws std::invalid_argument if the sample contradicts its sensor or earlier samples;
   /// std::logic_error after `finish` in playback (in live operation it is counted).

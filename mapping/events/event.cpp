@@ -14,15 +14,30 @@ void reject(const Event& event, int camera, const std::string& expected) {
                               formatSeconds(event.t_ns) + " s: " + expected);
 }
 
-void requireInsideSensor(EventSpan events, int camera, const CameraModel& model) {
-  const Event* outside = std::find_if(events.begin(), events.end(), [&](const Event& event) {
-    return event.x >= model.width || event.y >= model.height;
-  });
-  if (outside == events.end()) return;
-  reject(*outside, camera,
-         "pixel (" + std::to_string(outside->x) + ", " + std::to_string(outside->y) +
-             ") must lie inside the sensor of " + std::to_string(model.width) + "x" +
-             std::to_string(model.height));
+void rejectLate(const Event& event, int camera, std::int64_t newest_ns) {
+  reject(event, camera,
+         "must not come more than 10 ms after a newer one, that at " + formatSeconds(newest_ns) +
+             " s");
+}
+
+void requirePossible(EventSpan events, int camera, const RigCamera& calibration) {
+  const CameraModel& model = calibration.model;
+  const std::int64_t offset_ns = calibration.time_offset_ns;
+  const std::int64_t from_ns = std::max(-kEndOfTimeNs, -kEndOfTimeNs - offset_ns);
+  const std::int64_t until_ns = std::min(kEndOfTimeNs, kEndOfTimeNs - offset_ns);
+  for (const Event& event : events) {
+    if (event.x >= model.width || event.y >= model.height) {
+      reject(event, camera,
+             "pixel (" + std::to_string(event.x) + ", " + std::to_string(event.y) +
+                 ") must lie inside the sensor of " + std::to_string(model.width) + "x" +
+                 std::to_string(model.height));
+    }
+    if (event.t_ns < from_ns || event.t_ns > until_ns) {
+      reject(event, camera,
+             "times must lie within " + formatSeconds(kEndOfTimeNs) +
+                 " s, with the camera's offset of " + formatSeconds(offset_ns) + " s too");
+    }
+  }
 }
 
 namespace {

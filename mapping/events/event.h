@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/geometry/rig.h"
@@ -52,6 +53,28 @@ class EventSpan {
   const Event* end_ = nullptr;
 };
 
+/// Events of one camera that were checked: they lie inside the sensor, and none is over 10 ms older
+/// than an event before it. Reads like a const vector.
+class CheckedEvents {
+ public:
+  CheckedEvents() = default;
+  /// For code that has checked the events.
+  explicit CheckedEvents(std::vector<Event> events) : events_(std::move(events)) {}
+
+  auto begin() const { return events_.begin(); }
+  auto end() const { return events_.end(); }
+  std::size_t size() const { return events_.size(); }
+  bool empty() const { return events_.empty(); }
+  const Event& front() const { return events_.front(); }
+  const Event& back() const { return events_.back(); }
+  const std::vector<Event>& all() const { return events_; }
+  /// Returns the events, which need another check if they are changed.
+  std::vector<Event> take() && { return std::move(events_); }
+
+ private:
+  std::vector<Event> events_;
+};
+
 /// Largest delay of an event that arrives after a newer event of its camera. Such an event is
 /// sorted into place and counted.
 inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
@@ -64,8 +87,11 @@ inline constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
 /// Rejects an event. @throws std::invalid_argument "camera 0, event at 1.000000000 s: expected".
 [[noreturn]] void reject(const Event& event, int camera, const std::string& expected);
 
-/// Checks the pixels. @throws std::invalid_argument naming the first event outside the sensor.
-void requireInsideSensor(EventSpan events, int camera, const CameraModel& model);
+[[noreturn]] void rejectLate(const Event& event, int camera, std::int64_t newest_ns);
+
+/// @throws std::invalid_argument naming the first event that lies outside the sensor, or whose time
+/// is not within kEndOfTimeNs, also with the camera's offset.
+void requirePossible(EventSpan events, int camera, const RigCamera& calibration);
 
 /// A choice of a limited number of events, evenly spread over consecutive events. The events are
 /// divided into intervals of equal count (to within one event), and one event of each interval is

@@ -21,6 +21,12 @@ bool EventChecker::arePosesNear(const Run& run) const {
          run.max_ns <= poses_ns_->second + kNanosecondsPerSecond;
 }
 
+std::int64_t EventChecker::waitsSinceNs() const {
+  std::int64_t since_ns = kMaxTimeNs;
+  for (const Run& run : runs_) since_ns = std::min(since_ns, run.min_ns);
+  return since_ns;
+}
+
 EventChecker::Verdict EventChecker::add(const Event& event, std::uint64_t number) {
   const std::int64_t t_ns = event.t_ns;
   if (t_ns < newest_ns_ - kMaxEventDelayNs) return Verdict::kLate;
@@ -121,6 +127,55 @@ void EventChecker::settle(Settle how) {
     run.end -= events;
     run.wrong = false;  // more events may show it
   }
+}
+
+CheckedEvents EventIntake::add(std::vector<Event> events) {
+  requirePossible(events, camera_, calibration_);
+  EventChecker checker = checker_;  // kept if an event is late
+  const auto first = std::find_if_not(events.begin(), events.end(),
+                                      [&](const Event& event) { return checker.pass(event); });
+  if (first == events.end()) {
+    checker_ = std::move(checker);
+    return CheckedEvents(std::move(events));
+  }
+  std::vector<Event> right(events.begin(), first);
+  std::vector<Event> wrong;
+  for (auto event = first; event != events.end(); ++event) {
+    if (checker.pass(*event)) {
+      right.push_back(*event);
+    } else if (checker.add(*event, 0) == EventChecker::Verdict::kLate) {
+      rejectLate(*event, camera_, checker.newestNs());
+    } else {
+      takeSettled(checker, right, wrong);
+    }
+  }
+  checker_ = std::move(checker);
+  count(wrong);
+  return CheckedEvents(std::move(right));
+}
+
+CheckedEvents EventIntake::finish() {
+  std::vector<Event> right, wrong;
+  checker_.finish(true);
+  takeSettled(checker_, right, wrong);
+  count(wrong);
+  return CheckedEvents(std::move(right));
+}
+
+void EventIntake::takeSettled(EventChecker& checker, std::vector<Event>& right,
+                              std::vector<Event>& wrong) {
+  for (const EventChecker::Settled& settled : checker.takeSettled()) {
+    (settled.wrong ? wrong : right).push_back(settled.event);
+  }
+}
+
+void EventIntake::count(const std::vector<Event>& wrong) {
+  if (wrong_events_ == 0 && !wrong.empty()) {
+    first_wrong_ = "camera " + std::to_string(camera_) + ", event at " +
+                   formatSeconds(wrong.front().t_ns) +
+                   " s: expected a time near those of the events beside it";
+  }
+  wrong_events_ += wrong.size();
 }
 
 }  // namespace efm

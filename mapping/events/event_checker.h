@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "mapping/events/event.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -55,6 +57,10 @@ class EventChecker {
   /// then.
   void finish(bool at_end) { settle(at_end ? Settle::kAtEnd : Settle::kAtDamage); }
 
+  /// Returns the newest time of the events that are known to be right.
+  std::int64_t newestNs() const { return newest_ns_; }
+  /// Returns the earliest time of the events that wait; kMaxTimeNs if there is none.
+  std::int64_t waitsSinceNs() const;
   /// Returns the newest time of the last events, also if they wait.
   std::int64_t lastNs() const { return runs_.empty() ? newest_ns_ : runs_.back().max_ns; }
 
@@ -81,6 +87,43 @@ class EventChecker {
   std::vector<Event> waiting_;
   std::vector<Run> runs_;
   std::vector<Settled> settled_;
+};
+
+/// Checks the events that a program adds to a camera, in any portions.
+class EventIntake {
+ public:
+  EventIntake(int camera, RigCamera calibration)
+      : camera_(camera), calibration_(std::move(calibration)) {}
+
+  /// @return the events that are right, of this call and of earlier ones. The others wait, or have
+  /// a wrong time and are left out: see EventChecker.
+  /// @throws std::invalid_argument if an event is not possible, or is late. Then nothing of this
+  /// call is added.
+  CheckedEvents add(std::vector<Event> events);
+  /// Poses confirm the first and the last events.
+  void expectPoses(std::int64_t first_ns, std::int64_t last_ns) {
+    const std::int64_t offset_ns = calibration_.time_offset_ns;
+    checker_.expectPoses(first_ns - offset_ns, last_ns - offset_ns);
+  }
+  /// Ends the waiting.
+  CheckedEvents finish();
+
+  /// Returns the time of the first event that waits; kMaxTimeNs if there is none.
+  std::int64_t waitsSinceNs() const { return checker_.waitsSinceNs(); }
+  /// Returns the number of events with a wrong time, and what is wrong with the first.
+  std::uint64_t wrongEvents() const { return wrong_events_; }
+  const std::string& firstWrong() const { return first_wrong_; }
+
+ private:
+  static void takeSettled(EventChecker& checker, std::vector<Event>& right,
+                          std::vector<Event>& wrong);
+  void count(const std::vector<Event>& wrong);
+
+  int camera_;
+  RigCamera calibration_;
+  EventChecker checker_;
+  std::uint64_t wrong_events_ = 0;
+  std::string first_wrong_;
 };
 
 }  // namespace efm

@@ -45,38 +45,20 @@ class PosedTimes {
 
 CameraStream::CameraStream(int index, const RigCamera& camera, bool selected,
                            std::vector<bool> outside_lens, const EventFilterOptions& filter)
-    : index_(index),
-      model_(camera.model),
-      time_offset_ns_(camera.time_offset_ns),
-      selected_(selected),
-      outside_lens_(std::move(outside_lens)) {
-  if (filter.any()) filter_.emplace(EventFilter(model_.width, model_.height, filter));
+    : index_(index), camera_(camera), selected_(selected), outside_lens_(std::move(outside_lens)) {
+  if (filter.any()) filter_.emplace(EventFilter(camera_.model.width, camera_.model.height, filter));
 }
 
-void CameraStream::requireValid(EventSpan events) const {
-  requireInsideSensor(events, index_, model_);
-  std::int64_t late_before_ns = lateBefore();
-  for (const Event& event : events) {
-    const auto lies_within = [](std::int64_t t_ns) {
-      return t_ns >= -kEndOfTimeNs && t_ns <= kEndOfTimeNs;
-    };
-    if (!lies_within(event.t_ns) || !lies_within(onTrajectoryClock(event.t_ns))) {
-      reject(event, index_,
-             "times must lie within " + formatSeconds(kEndOfTimeNs) +
-                 " s, with the camera's offset of " + formatSeconds(time_offset_ns_) + " s too");
-    }
-    if (event.t_ns < late_before_ns) {
-      reject(event, index_,
-             "must not come more than 10 ms after a newer one, that at " +
-                 formatSeconds(late_before_ns + kMaxEventDelayNs) + " s");
-    }
-    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
+void CameraStream::requireNext(const CheckedEvents& packet) const {
+  for (const Event& event : {packet.front(), packet.back()}) {
+    requirePossible({&event, &event + 1}, index_, camera_);
+    if (event.t_ns < lateBefore()) rejectLate(event, index_, *newest_ns_ - camera_.time_offset_ns);
   }
 }
 
 /// Returns the time, on the camera's clock, before which events are too late.
 std::int64_t CameraStream::lateBefore() const {
-  return newest_ns_ ? lateAfter(*newest_ns_ - time_offset_ns_) : kMinTimeNs;
+  return newest_ns_ ? lateAfter(*newest_ns_ - camera_.time_offset_ns) : kMinTimeNs;
 }
 
 bool CameraStream::isOlder(const std::vector<Event>& events) const {
@@ -107,11 +89,11 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
                                 std::int64_t released_ns) {
   counts_.read += events.size();
   for (Event& event : events) {
-    event.t_ns += time_offset_ns_;
+    event.t_ns += camera_.time_offset_ns;
     newest_ns_ = std::max(newest_ns_.value_or(event.t_ns), event.t_ns);
   }
   const auto isUnwanted = [&](const Event& event) {
-    const auto width = static_cast<std::size_t>(model_.width);
+    const auto width = static_cast<std::size_t>(camera_.model.width);
     std::optional<EventFate> fate;
     if (selected_ && !limits.contain(event.t_ns)) {
       fate = EventFate::kOutsideWindow;

@@ -16,8 +16,8 @@
 
 namespace efm {
 
-/// Buffer of one camera's events from arrival to release. It checks and filters events, and counts
-/// each by its fate. Times are on the trajectory's clock: the camera's offset is added.
+/// Buffer of one camera's events from arrival to release. It filters events, and counts each by its
+/// fate. Times are on the trajectory's clock: the camera's offset is added.
 class CameraStream {
  public:
   /// @param selected whether the camera's events take part.
@@ -25,9 +25,9 @@ class CameraStream {
   CameraStream(int index, const RigCamera& camera, bool selected, std::vector<bool> outside_lens,
                const EventFilterOptions& filter);
 
-  /// @throws std::invalid_argument if an event lies outside the sensor, or is more than 10 ms older
-  /// than an event before it.
-  void requireValid(EventSpan events) const;
+  /// @throws std::invalid_argument if the packet begins over 10 ms before the newest event of
+  /// earlier packets, or its times leave the limits of time by the camera's offset.
+  void requireNext(const CheckedEvents& packet) const;
   /// See FusionMapper::isOlder.
   bool isOlder(const std::vector<Event>& events) const;
   /// See FusionMapper::dropLate.
@@ -45,7 +45,7 @@ class CameraStream {
   }
 
   bool selected() const { return selected_; }
-  std::int64_t onTrajectoryClock(std::int64_t t_ns) const { return t_ns + time_offset_ns_; }
+  std::int64_t onTrajectoryClock(std::int64_t t_ns) const { return t_ns + camera_.time_offset_ns; }
   std::optional<std::int64_t> newestNs() const { return newest_ns_; }
   /// Returns the time before which all events have been added.
   std::int64_t completeNs() const { return complete_ns_; }
@@ -78,8 +78,7 @@ class CameraStream {
   std::int64_t lateBefore() const;
 
   int index_;
-  CameraModel model_;
-  std::int64_t time_offset_ns_;
+  RigCamera camera_;
   bool selected_;
   std::vector<bool> outside_lens_;
   std::optional<FilteredEvents> filter_;

@@ -81,16 +81,15 @@ void FusionMapper::addPose(const StampedPose& pose) {
   if (!trajectory_.add(pose)) ++counts_.duplicate_poses;
 }
 
-void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked) {
+void FusionMapper::addEvents(int camera, CheckedEvents events) {
   CameraStream& stream = cameras_.at(static_cast<std::size_t>(camera));
   if (events.empty()) return;
-  const Event ends[] = {events.front(), events.back()};  // the earliest and the latest time
-  stream.requireValid(checked ? EventSpan(ends, ends + 2) : EventSpan(events));
+  stream.requireNext(events);
   const std::int64_t begin_ns = stream.onTrajectoryClock(events.front().t_ns);
   // The beginning of packets is compared: during a long packet of another camera, this camera need
   // not have delivered yet.
   packet_ns_ = std::max(packet_ns_.value_or(begin_ns), begin_ns);
-  counts_.sorted_events += stream.add(std::move(events), options_.limits, released_ns_);
+  counts_.sorted_events += stream.add(std::move(events).take(), options_.limits, released_ns_);
   if (heldEvents() >= options_.max_waiting_events) silent_ns_ = *packet_ns_ - kMaxCameraLagNs;
   const std::int64_t newest_ns = *stream.newestNs();
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);

@@ -63,12 +63,11 @@ class FusionMapper : private RecordingProgress {
   /// @throws std::invalid_argument if the pose is not valid, or is more than a second older than
   /// the newest pose.
   void addPose(const StampedPose& pose);
-  /// @param events of one camera. Events that are up to 10 ms older than an event before them are
-  /// sorted and counted.
-  /// @throws std::invalid_argument if an event is still older, or lies outside the sensor. Then no
-  /// event of this call is added.
-  /// @param checked true if the events are known to lie inside the sensor and to be in time order.
-  void addEvents(int camera, std::vector<Event> events, bool checked = false);
+  /// Adds the next events of a camera. Events that are up to 10 ms older than an event before them
+  /// are sorted and counted.
+  /// @throws std::invalid_argument if they begin over 10 ms before the newest event of earlier
+  /// calls. Then no event of this call is added.
+  void addEvents(int camera, CheckedEvents events);
   /// Returns whether a camera's clock may have been reset: the events are in time order (to 10 ms),
   /// and each event is more than 10 ms older than the newest event of earlier calls.
   bool isOlder(int camera, const std::vector<Event>& events) const {

@@ -219,8 +219,6 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
   for (std::size_t i = 0; i < selected_.size(); ++i) {
     const EventSpan& of_camera = events.at(static_cast<std::size_t>(selected_[i]));
     const RigCamera& calibration = cameraOf(selected_[i]);
-    // Later steps look up and count by pixel.
-    requireInsideSensor(of_camera, selected_[i], calibration.model);
     cameras.push_back({selected_[i], &calibration, &undistortion_[i], of_camera});
   }
   return cameras;

@@ -34,21 +34,19 @@ int runImport(const ImportArguments& arguments) {
   const std::unique_ptr<Recording> recording = openRecording(source);
   const Interruption interruption;
   const auto writer = mrptLibrary(arguments.out.string() + ": a rawlog")
-                          .writeRawlog(arguments.out, arguments.compression);
-  std::map<std::string, std::uint64_t> events;  // by label
+                          .writeRawlog(arguments.out, arguments.compression, *recording);
+  std::vector<std::uint64_t> events(recording->rig().cameras.size());
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;
   std::uint64_t odometry = 0;  // poses from odometry
   std::uint64_t others = 0;
-  std::map<int, CameraModel> cameras;
   std::optional<std::string> damage;
   {
     Progress progress("importing", arguments.verbosity);
     damage = readAll(*recording, [&](Sample sample) {
       interruption.check();
       if (const auto* packet = std::get_if<EventPacket>(&sample)) {
-        cameras.emplace(packet->camera, packet->calibration.model);
-        events[packet->label] += packet->events.size();
+        events[static_cast<std::size_t>(packet->camera)] += packet->events.size();
         all_events += packet->events.size();
       } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
         ++poses;
@@ -66,7 +64,7 @@ int runImport(const ImportArguments& arguments) {
     }
     writer->close();
   }
-  printWarnings(missingParts(cameras, all_events > 0, poses > 0));
+  printWarnings(missingParts(recording->rig(), all_events > 0, poses > 0));
   printWarnings(lossWarnings(recording->counts()));
   printWarnings(recording->counts().notes, "note");
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
@@ -77,7 +75,10 @@ int runImport(const ImportArguments& arguments) {
   }
   const int status = damage ? failAfter(*damage, all_events, poses, arguments.out) : 0;
   if (arguments.verbosity == Verbosity::kQuiet) return status;
-  for (const auto& [label, count] : events) fmt::print("{}: {} events\n", label, count);
+  const std::vector<RecordedCamera> cameras = recording->cameras();
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    fmt::print("{}: {} events\n", cameras[i].label, events[i]);
+  }
   if (others > 0) fmt::print("{} other observations\n", others);
   fmt::print("{} poses; {} events were out of order and sorted\n", poses,
              recording->counts().sorted_events);
@@ -147,13 +148,15 @@ int runExport(const ExportArguments& arguments) {
     damage = readAll(*recording, [&](Sample sample) {
       interruption.check();
       if (auto* packet = std::get_if<EventPacket>(&sample)) {
-        for (Event& event : packet->events) event.t_ns += packet->calibration.time_offset_ns;
-        writer->addEvents(static_cast<std::size_t>(packet->camera), packet->events);
-        events += packet->events.size();
+        const auto camera = static_cast<std::size_t>(packet->camera);
+        std::vector<Event> stamped = std::move(packet->events).take();
+        for (Event& event : stamped) event.t_ns += rig.cameras[camera].time_offset_ns;
+        writer->addEvents(camera, stamped);
+        events += stamped.size();
       } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
         if (!pose_source) pose_source = pose->source;
         const bool is_used = pose->source == *pose_source;
-        if (is_used) writer->addPose({pose->t_ns, rigPose(*pose, {}) * rig.cameras[0].T_rig_cam});
+        if (is_used) writer->addPose({pose->t_ns, pose->T_world_rig() * rig.cameras[0].T_rig_cam});
         ++(is_used ? poses : other_poses);
       }
       progress.show(recording->progress());
@@ -171,11 +174,7 @@ int runExport(const ExportArguments& arguments) {
   if (arguments.verbosity != Verbosity::kQuiet) {
     fmt::print("{} events, {} poses; written to {}\n", events, poses, arguments.out.string());
   }
-  std::map<int, CameraModel> cameras;
-  for (const RigCamera& camera : rig.cameras) {
-    cameras.emplace(static_cast<int>(cameras.size()), camera.model);
-  }
-  printWarnings(missingParts(cameras, events > 0, poses > 0));
+  printWarnings(missingParts(rig, events > 0, poses > 0));
   if (other_poses > 0) {
     printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
                                                 other_poses, asText(*pose_source))}});

@@ -57,15 +57,15 @@ void printRate(const EventRate& rate, std::int64_t first_ns, std::int64_t last_n
 
 void printCameras(const RecordingStatistics& statistics) {
   const auto span = statistics.eventSpan();
-  for (const auto& [key, camera] : statistics.cameras()) {
-    fmt::print("{}: {}\n  ", key.second, asText(camera.camera.model));
+  for (const auto& [index, camera] : statistics.cameras()) {
+    fmt::print("{}: {}\n  ", camera.label, asText(camera.camera.model));
     printStream(camera.events, "events");
     if (span) printRate(camera.rate, span->first_ns, span->last_ns);
   }
   const auto& cameras = statistics.cameras();
   for (auto a = cameras.begin(); a != cameras.end(); ++a) {
     for (auto b = std::next(a); b != cameras.end(); ++b) {
-      fmt::print("baseline {} to {}: {:g} m\n", a->first.second, b->first.second,
+      fmt::print("baseline {} to {}: {:g} m\n", a->second.label, b->second.label,
                  baselineOf(a->second.camera, b->second.camera));
     }
   }

@@ -63,16 +63,22 @@ std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind
   return name + (kind == OutputKind::kMap ? "_map" : "_depth");
 }
 
+/// Names how the file of an option was given, if it does not exist.
+void requireFile(const OptionReader& reader, const char* key, const std::filesystem::path& file) {
+  const std::string given = reader.given("rig", key);
+  if (given.empty() || file.empty() || std::filesystem::exists(file)) return;
+  throw std::runtime_error(given + ": no such file");
+}
+
 /// A job of the command line, and the options as they were given, for errors.
 struct MapCommand {
   MapCommand(const MappingArguments& given, OutputKind output_kind)
       : arguments(given), kind(output_kind), reader(readerOf(given)) {
     job.source = arguments.source;
-    if (job.source.calibration.empty()) {
-      job.source.calibration_given = reader.given("rig", "calibration");
-    }
-    if (job.source.hand_eye.empty()) job.source.hand_eye_given = reader.given("rig", "hand_eye");
     job.options = asUsage([&] { return reader.options(); });
+    const RigOptions& rig = job.options.rig;
+    if (job.source.calibration.empty()) requireFile(reader, "calibration", rig.calibration);
+    if (job.source.hand_eye.empty()) requireFile(reader, "hand_eye", rig.hand_eye);
     job.prepare();
     job.out = outputFolder(arguments, kind);
     job.force = arguments.force;

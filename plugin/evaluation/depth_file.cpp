@@ -14,11 +14,11 @@
 #include <string_view>
 
 #include "mapping/base/atomic_file.h"
+#include "mapping/base/npy_header.h"
 #include "mapping/base/option.h"
 #include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "maps/io/npy_header.h"
 #include "maps/io/point_record.h"
 
 namespace efm {

@@ -62,6 +62,11 @@ std::shared_ptr<Mapper> CEventFusionMapBuilder::mapper() const {
   return mapper_;
 }
 
+std::shared_ptr<RigFromPackets> CEventFusionMapBuilder::packets() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return packets_;
+}
+
 /// @param earlier keyframes of an initial map.
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
@@ -77,10 +82,12 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                         [this](const std::string& text) { MRPT_LOG_WARN(text); },
                         [this](const std::string& text) { MRPT_LOG_INFO(text); }},
       earlier);
+  auto packets = std::make_shared<RigFromPackets>(builder_options, next);
   // Stopped without the lock: the mapper's thread may run a callback that uses the builder.
   if (const auto former = mapper()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
+  packets_ = std::move(packets);
   mapper_->core().setSink(sink_);
   tracker_poses_ = {};
   options_ = builder_options;
@@ -132,20 +139,15 @@ void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
   if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
-    EventPacket packet{events->camera_index, calibrationOf(*events), events->events,
-                       events->covered_until_ns};
-    if (options.enableMapUpdating) {  // MRPT's option of every map builder
-      mapper()->add(std::move(packet));
-    } else {
-      mapper()->core().skip(packet);
-    }
-  } else if (const auto pose = poseIn(*observation)) {
+    packets()->add(*events, options.enableMapUpdating);  // MRPT's option of every map builder
+  } else if (auto pose = poseIn(*observation)) {
     const auto mapper = this->mapper();
+    pose->T_body_rig = mapper->core().setup().T_body_rig.value_or(pose->T_body_rig);
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      tracker_poses_.add(*observation, *pose, rigPose(*pose, mapper->core().T_body_rig()));
+      tracker_poses_.add(*observation, *pose);
     }
-    mapper->add(*pose);
+    mapper->add(std::move(*pose));
   } else if (isFinish(*observation)) {
     finish();
   } else {
@@ -154,7 +156,16 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   }
 }
 
-void CEventFusionMapBuilder::finish() { mapper()->finish(); }
+void CEventFusionMapBuilder::finish() {
+  std::exception_ptr error;  // of cameras that never came: the others are mapped all the same
+  try {
+    packets()->finish();
+  } catch (const std::invalid_argument&) {
+    error = std::current_exception();
+  }
+  mapper()->finish();
+  if (error) std::rethrow_exception(error);
+}
 
 std::shared_ptr<const MapSnapshot> CEventFusionMapBuilder::snapshot() const {
   const auto map = mapper()->keyframes();

@@ -20,6 +20,7 @@
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/rig_from_packets.h"
 #include "plugin/options/option_file.h"
 
 namespace efm {
@@ -28,9 +29,7 @@ namespace efm {
 /// CObservationRobotPose). The poses are in the world's frame: the builder does no localisation.
 /// The same observations make the same map, bit for bit.
 ///
-/// The builder maps nothing until the rig is complete. If the options or the recording declare the
-/// cameras (see CObservationEvents), the rig is complete with the first event. Otherwise it is
-/// complete when a packet begins more than a second after the first event. A camera that first
+/// The builder maps nothing until the rig is complete: see RigFromPackets. A camera that first
 /// appears later is an error.
 ///
 /// Automatic options (the default of depth limits, planes and windows) are chosen as the program
@@ -157,6 +156,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
  private:
   void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
   std::shared_ptr<Mapper> mapper() const;
+  std::shared_ptr<RigFromPackets> packets() const;
   template <typename Argument>
   std::function<void(const Argument&)> hosts(
       std::function<void(const Argument&)> CEventFusionMapBuilder::*callback);
@@ -172,9 +172,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   DsiSink* sink_ = nullptr;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
-  DeadReckoning reckoning_;         // composes the actions
-  std::shared_ptr<Mapper> mapper_;  // never null; used without the lock
-  mutable std::mutex made_mutex_;   // locked before mutex_; protects the results of MRPT's getters:
+  DeadReckoning reckoning_;                  // composes the actions
+  std::shared_ptr<Mapper> mapper_;           // never null; used without the lock
+  std::shared_ptr<RigFromPackets> packets_;  // as mapper_
+  mutable std::mutex made_mutex_;  // locked before mutex_; protects the results of MRPT's getters:
   mutable std::weak_ptr<Mapper> made_of_;
   mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
       clouds_;

@@ -157,8 +157,8 @@ mrpt::obs::CObservation::Ptr DeadReckoning::poseAfter(const mrpt::obs::CActionCo
   return poseObservation({{PoseKind::kActions, kActionsLabel}, t_ns, T_world_body_, {}});
 }
 
-void TrackerPoses::add(const mrpt::obs::CObservation& observation, const PoseSample& pose,
-                       const Rigid3& T_world_rig) {
+void TrackerPoses::add(const mrpt::obs::CObservation& observation, const PoseSample& pose) {
+  const Rigid3 T_world_rig = pose.T_world_rig();
   const auto [at, is_new] = newest_.try_emplace(pose.source);
   Newest& newest = at->second;
   // If a pose is over 1 s older, the newest time was wrong, or the clock was reset.

@@ -93,8 +93,7 @@ class DeadReckoning {
 class TrackerPoses {
  public:
   /// Adds a pose. @param observation the observation that contains `pose`.
-  void add(const mrpt::obs::CObservation& observation, const PoseSample& pose,
-           const Rigid3& T_world_rig);
+  void add(const mrpt::obs::CObservation& observation, const PoseSample& pose);
   /// @param selected the source that is used. Before a source is selected, the first source with
   /// poses in the world is used.
   /// @return the newest pose; null before the source's first pose.

@@ -392,23 +392,21 @@ RawlogScan scanOf(const std::filesystem::path& file, bool keep_originals) {
   return scan;
 }
 
-CObservation::Ptr packetOf(EventPacket packet) {
-  const auto original = std::static_pointer_cast<const CObservationEvents>(packet.original);
-  const RigCamera& camera = packet.calibration;
+CObservationEvents::Ptr emptyPacketOf(int index, const RigCamera& camera,
+                                      const RecordedCamera& recorded) {
+  const auto original = std::static_pointer_cast<const CObservationEvents>(recorded.original);
   auto observation = CObservationEvents::Create();
-  observation->sensorLabel = packet.label;
-  observation->timestamp = packet.t_ns ? mrptTimeFrom(*packet.t_ns) : INVALID_TIMESTAMP;
-  observation->camera_index = packet.camera;
+  observation->sensorLabel = recorded.label;
+  observation->timestamp = INVALID_TIMESTAMP;
+  observation->camera_index = index;
   observation->camera = camera.model;
   const bool is_original = original && isSame(calibrationOf(*original).T_rig_cam, camera.T_rig_cam);
   observation->camera_pose = is_original ? original->camera_pose : mrptPoseFrom(camera.T_rig_cam);
   observation->time_offset_ns = camera.time_offset_ns;
-  observation->events = std::move(packet.events);
-  observation->covered_until_ns = packet.covered_until_ns;
   return observation;
 }
 
-CObservation::Ptr poseOf(const PoseSample& pose) {
+CObservation::Ptr observationOf(const PoseSample& pose) {
   if (!pose.original) return poseObservation(pose);
   const auto original = std::static_pointer_cast<const CObservation>(pose.original);
   auto observation = std::dynamic_pointer_cast<CObservation>(original->duplicateGetSmartPtr());
@@ -426,8 +424,10 @@ CObservation::Ptr poseOf(const PoseSample& pose) {
 
 class GzRawlogWriter : public RawlogWriter {
  public:
-  GzRawlogWriter(const std::filesystem::path& file, RawlogCompression compression)
-      : file_(file),
+  GzRawlogWriter(const std::filesystem::path& file, RawlogCompression compression,
+                 const Recording& recording)
+      : recording_(recording),
+        file_(file),
         compression_(compression == RawlogCompression::kZstd ? EventCompression::kZstd
                                                              : EventCompression::kNone),
         stream_(file_.temporary(), compression == RawlogCompression::kGzip
@@ -435,13 +435,20 @@ class GzRawlogWriter : public RawlogWriter {
                                        : GzStream::Mode::kWritePlain) {}
 
   void write(Sample sample) override {
-    const CObservation::Ptr observation = observationOf(std::move(sample));
-    if (const auto packet = asPacket(observation)) packet->compression = compression_;
-    try {
-      auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
-      archive << *observation;
-    } catch (const std::exception& error) {
-      throw std::runtime_error(file_.path().string() + ": cannot be written: " + error.what());
+    if (auto* packet = std::get_if<EventPacket>(&sample)) {
+      if (cameras_.empty()) declareRig(packet->events.front().t_ns);
+      const auto& camera = *cameras_[static_cast<std::size_t>(packet->camera)];
+      auto observation = std::make_shared<CObservationEvents>(camera);
+      observation->timestamp = mrptTimeFrom(packet->events.front().t_ns);
+      observation->events = std::move(packet->events).take();
+      observation->covered_until_ns = packet->complete_until_ns;
+      write(observation);
+    } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
+      write(observationOf(*pose));
+    } else {
+      const auto& original = std::get<OtherSample>(sample).original;
+      write(std::const_pointer_cast<CObservation>(
+          std::static_pointer_cast<const CObservation>(original)));
     }
   }
 
@@ -455,6 +462,31 @@ class GzRawlogWriter : public RawlogWriter {
   }
 
  private:
+  /// Writes one empty packet per camera: see CObservationEvents.
+  void declareRig(std::int64_t first_ns) {
+    const std::vector<RigCamera>& rig = recording_.rig().cameras;
+    const std::vector<RecordedCamera> recorded = recording_.cameras();
+    for (std::size_t i = 0; i < rig.size(); ++i) {
+      auto& camera = cameras_.emplace_back(emptyPacketOf(static_cast<int>(i), rig[i], recorded[i]));
+      camera->compression = compression_;
+      auto declaration = std::make_shared<CObservationEvents>(*camera);
+      declaration->timestamp = mrptTimeFrom(first_ns);
+      declaration->covered_until_ns = recorded[i].first_ns;
+      write(declaration);
+    }
+  }
+
+  void write(const CObservation::Ptr& observation) {
+    try {
+      auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
+      archive << *observation;
+    } catch (const std::exception& error) {
+      throw std::runtime_error(file_.path().string() + ": cannot be written: " + error.what());
+    }
+  }
+
+  const Recording& recording_;
+  std::vector<CObservationEvents::Ptr> cameras_;  // packets without events
   AtomicFile file_;
   EventCompression compression_;
   GzStream stream_;
@@ -551,16 +583,10 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
   return parts;
 }
 
-CObservation::Ptr observationOf(Sample sample) {
-  if (auto* packet = std::get_if<EventPacket>(&sample)) return packetOf(std::move(*packet));
-  if (const auto* pose = std::get_if<PoseSample>(&sample)) return poseOf(*pose);
-  return std::const_pointer_cast<CObservation>(
-      std::static_pointer_cast<const CObservation>(std::get<OtherSample>(sample).original));
-}
-
 std::unique_ptr<RawlogWriter> writeRawlog(const std::filesystem::path& file,
-                                          RawlogCompression compression) {
-  return std::make_unique<GzRawlogWriter>(file, compression);
+                                          RawlogCompression compression,
+                                          const Recording& recording) {
+  return std::make_unique<GzRawlogWriter>(file, compression, recording);
 }
 
 }  // namespace efm

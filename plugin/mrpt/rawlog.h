@@ -51,12 +51,11 @@ class GzStream : public mrpt::io::CStream {
 /// class. Entries are counted from 0, as in MRPT's programs. All entries before N are read.
 RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options);
 
-/// Converts a sample to MRPT's form. A sample from a rawlog keeps the labels, the covariances and
-/// the digits of poses that it had there.
-mrpt::obs::CObservation::Ptr observationOf(Sample sample);
-
-/// Writes a rawlog for MRPT's own programs. The file gets its name when it is complete.
+/// Writes samples of a recording, which must live longer, as a rawlog for MRPT's own programs. The
+/// file gets its name when it is complete. A sample from a rawlog keeps the labels, the covariances
+/// and the digits of poses that it had there.
 std::unique_ptr<RawlogWriter> writeRawlog(const std::filesystem::path& file,
-                                          RawlogCompression compression);
+                                          RawlogCompression compression,
+                                          const Recording& recording);
 
 }  // namespace efm

@@ -43,7 +43,6 @@ RecordingSource MapJob::sourceNow() const {
   RecordingSource now = source;
   now.calibration = options.rig.calibration;
   now.hand_eye = options.rig.hand_eye;
-  now.setup = options.rig.setup;
   if (!options.mapper.cameras.empty()) now.cameras = options.mapper.cameras;
   now.time_offsets_ns = options.rig.time_offsets_ns;
   PosePerturbationOptions& perturbation = now.faults.perturbation;
@@ -66,7 +65,7 @@ void MapJob::prepare() {
   if (!source.calibration.empty()) options.rig.calibration = source.calibration;
   if (!source.poses.empty()) options.rig.pose_source.clear();  // a single source
   if (!source.hand_eye.empty()) options.rig.hand_eye = source.hand_eye;
-  options.rig.setup = std::make_shared<RigSetup>(readRigSetup(sourceNow()));
+  source.setup = std::make_shared<RigSetup>(readRigSetup(sourceNow()));
 }
 
 namespace {
@@ -156,9 +155,7 @@ void rejectOutputFolder(const MapJob& job, OutputKind kind) {
 class MapSteps {
  public:
   MapSteps(MapJob given, OutputKind output_kind)
-      : job(std::move(given)), kind(output_kind), options(job.options) {
-    first.statistics = RecordingStatistics(statisticsOptions(options));
-  }
+      : job(std::move(given)), kind(output_kind), options(job.options) {}
 
   MapJob job;
   const OutputKind kind;
@@ -194,14 +191,12 @@ class MapSteps {
   [[noreturn]] void rethrow(int written) const;
 
  private:
-  void takeCalibrationOf(std::size_t count);
   std::unique_ptr<Recording> firstLook();
   std::optional<double> sequenceMaximum();
   std::string stays() const;
   void warnOfNew();
 
   std::size_t reported_warnings_ = 0;
-  std::vector<int> calibrated_;  // the given `[rig] cameras`, see takeCalibrationOf
   std::optional<UserError> write_error_;
   const double start_cpu_s_ = processSeconds();
   std::chrono::steady_clock::time_point began_;
@@ -232,32 +227,25 @@ void MapSteps::begin() {
                  job.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure, namesOf(all));
 }
 
-/// If the calibration has more cameras than the recording, leaves those that `[rig] cameras` or
-/// the source names: they are all cameras of the recording.
-void MapSteps::takeCalibrationOf(std::size_t count) {
-  RigSetup setup = options.rig.setup ? *options.rig.setup : RigSetup();
-  if (!setup.calibration || setup.calibration->rig.cameras.size() <= count) return;
-  calibrated_ = job.sourceNow().cameras;
-  setup.calibration = setup.calibration->of(count, calibrated_);
-  options.rig.setup = std::make_shared<RigSetup>(std::move(setup));
-  options.mapper.cameras.clear();
-  first.statistics = RecordingStatistics(statisticsOptions(options));
-}
-
 /// Chooses the automatic options, and warns of poses that do not explain the events.
 /// @return the recording again, if its events fit into `[live] max_queue_mb`; otherwise null.
 std::unique_ptr<Recording> MapSteps::firstLook() {
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
   Recording& source = held->source();
-  takeCalibrationOf(source.rig().cameras.size());
+  if (!source.counts().of_calibration.empty()) {  // they are all cameras of the recording
+    job.source.cameras = source.counts().of_calibration;
+    options.mapper.cameras.clear();
+  }
+  first.statistics = RecordingStatistics(statisticsOptions(options));
+  first.statistics.setCameras(source.rig(), source.cameras());
   FirstLook look(options);
   Progress progress("first look", job.verbosity);
   const auto next = [&] {
     requireNoStop();
     return source.read();  // the mapping reports damage
   };
-  bool takes = true;  // the mapping reports rejected samples
+  bool takes = look.take(source.rig());  // the mapping reports rejected samples
   std::optional<Sample> sample;
   while ((takes || options.live.enabled) && (sample = next())) {
     takes = look.take(*sample);
@@ -337,7 +325,9 @@ void MapSteps::write(const std::function<void()>& file) {
 
 void MapSteps::describe(MappingRun& run, bool stopped) {
   run.describe(report, stopped);
-  if (!calibrated_.empty()) report.options.mapper.cameras = calibrated_;
+  if (const std::vector<int> cameras = recording->counts().of_calibration; !cameras.empty()) {
+    report.options.mapper.cameras = cameras;
+  }
   report.recording = namesOf(job.source);
   report.faults = job.sourceNow().faults;
   const std::string calibration = options.rig.calibration.string();

@@ -31,8 +31,15 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
     const std::lock_guard<std::mutex> lock(made_mutex_);  // called in the mapper's own thread
     made_.push_back(keyframe);
   };
-  mapper_ = std::make_shared<Mapper>(options, std::move(callbacks));
+  EventFusionOptions of_rig = options;
+  of_rig.rig = {};  // the recording has its files
+  of_rig.rig.pose_source = options.rig.pose_source;
+  mapper_ = std::make_shared<Mapper>(of_rig, std::move(callbacks));
   mapper_->core().setFacts(first_.quality);
+  attempt([this] {
+    give([this] { mapper_->addCameras(recording_.rig()); });
+    return true;
+  });
 }
 
 /// Runs a step. @return false if it throws. The run's error is the first exception.
@@ -68,6 +75,17 @@ void MappingRun::finish() {
   attempt([this] { return mapper_->finish(), false; });
 }
 
+/// Calls a function that gives data of the recording to the mapper.
+template <typename Call>
+void MappingRun::give(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument&) {
+    rejected_ = true;
+    throw;
+  }
+}
+
 /// @return false at the end of the recording.
 bool MappingRun::feedNext() {
   std::optional<Sample> sample;
@@ -83,12 +101,7 @@ bool MappingRun::feedNext() {
   }
   if (options_.live.enabled) waitForTimeOf(*sample);
   if (std::holds_alternative<PoseSample>(*sample)) first_.statistics.add(*sample);
-  try {
-    mapper_->add(std::move(*sample));
-  } catch (const std::invalid_argument&) {
-    rejected_ = true;
-    throw;
-  }
+  give([&] { mapper_->add(std::move(*sample)); });
   return true;
 }
 
@@ -97,7 +110,7 @@ void MappingRun::waitForTimeOf(const Sample& sample) {
   if (const auto* pose = std::get_if<PoseSample>(&sample)) {
     t_ns = pose->t_ns;
   } else if (const auto* packet = std::get_if<EventPacket>(&sample)) {
-    t_ns = packet->events.empty() ? packet->t_ns.value_or(kMinTimeNs) : packet->events.back().t_ns;
+    t_ns = packet->events.back().t_ns;
   } else {
     return;
   }
@@ -236,7 +249,6 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   if (status.events) {
     report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }
-  first_.statistics.setCameras(status.rig.cameras);
   Findings findings{first_.statistics, read};
   findings.use(planes, first_.chosen);
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;

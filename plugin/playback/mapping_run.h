@@ -68,6 +68,8 @@ class MappingRun {
   template <typename Step>
   bool attempt(const Step& step);
   void noteError(const std::exception& caught);
+  template <typename Call>
+  void give(const Call& call);
   bool feedNext();
   void deliver(const KeyframeDepthMap& keyframe);
   void deliverMade();
@@ -112,6 +114,7 @@ class HeldRecording : public Recording {
   std::optional<Sample> read() override;
   std::string damage() const override { return source_->damage(); }
   const Rig& rig() const override { return source_->rig(); }
+  std::vector<RecordedCamera> cameras() const override { return source_->cameras(); }
   std::string position() const override { return position_; }
   double progress() const override;
   RecordingCounts counts() const override { return source_->counts(); }

@@ -45,9 +45,9 @@ void add(Json& json, const char* what, const StreamStatistics& stream) {
   json["per_second"] = stream.rate();
 }
 
-Json asJson(const std::string& label, const CameraStatistics& statistics) {
+Json asJson(const CameraStatistics& statistics) {
   const CameraModel& model = statistics.camera.model;
-  Json json = {{"name", label}, {"width", model.width}, {"height", model.height}};
+  Json json = {{"name", statistics.label}, {"width", model.width}, {"height", model.height}};
   json["calibrated"] = isCalibrated(model);
   add(json, "events", statistics.events);
   json["positive"] = statistics.positive;
@@ -74,8 +74,9 @@ RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>
   source.reader.lists_topics = true;
   const std::unique_ptr<Recording> recording = openRecording(source);
   RecordingInfo info;
+  info.statistics.setCameras(recording->rig(), recording->cameras());
   FirstLook look(defaultOptions());
-  bool takes = true;  // a recording may lack parts of a map
+  bool takes = look.take(recording->rig());  // a recording may lack parts of a map
   while (const std::optional<Sample> sample = recording->read()) {
     ++info.observations;
     if (!info.statistics.add(*sample)) ++info.others[std::get<OtherSample>(*sample).type];
@@ -95,8 +96,8 @@ RecordingInfo readInfo(RecordingSource source, const std::function<void(double)>
 std::string infoJson(const RecordingInfo& info) {
   Json json = {{"observations", info.observations}};
   json["cameras"] = Json::array();
-  for (const auto& [key, camera] : info.statistics.cameras()) {
-    json["cameras"].push_back(asJson(key.second, camera));
+  for (const auto& [index, camera] : info.statistics.cameras()) {
+    json["cameras"].push_back(asJson(camera));
   }
   json["poses"] = Json::array();
   for (const auto& [source, poses] : info.statistics.poseSources()) {

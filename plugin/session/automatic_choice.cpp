@@ -64,7 +64,7 @@ bool MappingSession::chooseAutomatic() {
 }
 
 bool MappingSession::chooseFromSoFar(double at_least_s) {
-  if (!rig_.isComplete() || !options_.automatic.any()) return false;
+  if (!hasCameras() || !options_.automatic.any()) return false;
   std::optional<WindowData> data = mapper_.window();
   if (!data) data = mapper_.rest();
   if (!data || lengthOf(*data) < at_least_s) return false;
@@ -99,7 +99,10 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
 /// Chooses in playback, after the end of the recording or if too many events are held.
 bool MappingSession::chooseFromFirstLook() {
   const double held_mb = static_cast<double>(mapper_.heldEvents() * sizeof(Event)) / 1e6;
-  if (!finished_ && !first_look_ends_ && held_mb <= options_.live.max_queue_mb) return false;
+  const bool ends =
+      first_look_ends_ && status_.events &&
+      secondsBetween(status_.events->first_ns, status_.events->last_ns) > kFirstWindowS;
+  if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return false;
   const RecordingSurvey survey = std::exchange(first_look_, nullptr)->finish();
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,

@@ -34,7 +34,7 @@ void checkBaselines(const Cameras& cameras, Warnings& warnings) {
                  "cameras {} and {} are {:g} m apart: expected {:g} to {:g} m; "
                  "are the translations of the calibration in metres? "
                  "(--calibration)",
-                 a->first.first, b->first.first, baseline_m, kMinBaselineM, kMaxBaselineM);
+                 a->first, b->first, baseline_m, kMinBaselineM, kMaxBaselineM);
     }
   }
 }
@@ -92,27 +92,27 @@ void checkLens(int camera, const CameraModel& model, Warnings& warnings) {
 
 void checkActivity(const Cameras& cameras, Warnings& warnings) {
   std::uint64_t most = 0;
-  for (const auto& [key, camera] : cameras) most = std::max(most, camera.events.count);
-  for (const auto& [key, camera] : cameras) {
+  for (const auto& [index, camera] : cameras) most = std::max(most, camera.events.count);
+  for (const auto& [index, camera] : cameras) {
     const std::uint64_t count = camera.events.count;
     if (count == 0 && most > 0) {
       addWarning(warnings, "silent-camera",
                  "camera {} has no event; [rig] cameras "
                  "leaves it out",
-                 key.first);
+                 index);
     } else if (most >= kEnoughEvents &&
                count < most / 10) {  // equal cameras differ by a factor of 2
       addWarning(warnings, "few-events",
                  "camera {} has {} events, another one {}: is its lens covered "
                  "or its sensitivity lower? ([rig] cameras leaves it out)",
-                 key.first, count, most);
+                 index, count, most);
     }
     if (count >= kEnoughEvents && (camera.positive == 0 || camera.positive == count)) {
       addWarning(warnings, "polarity",
                  "all {} events of camera {} have the polarity {}: is it the "
                  "right column? (--event-columns; [fusion] split_polarity = "
                  "false does without)",
-                 count, key.first, camera.positive == 0 ? 0 : 1);
+                 count, index, camera.positive == 0 ? 0 : 1);
     }
   }
 }
@@ -129,7 +129,7 @@ double fractionOfBusiest(const CameraStatistics& camera) {
 void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
   // Edges sweep over most of the image. A single hot pixel is left to the filter.
   constexpr double kMaxFraction = 0.9;
-  for (const auto& [key, camera] : cameras) {
+  for (const auto& [index, camera] : cameras) {
     // With fewer events, 1 % of the pixels may have all events by chance.
     if (camera.pixels.empty() || camera.events.count < camera.pixels.size() / 10) continue;
     const double fraction = fractionOfBusiest(camera);
@@ -138,7 +138,7 @@ void checkHotPixels(const Cameras& cameras, Warnings& warnings) {
                "{:.0f} % of the events of camera {} come from 1 % of its pixels: hot pixels, "
                "a blinking light or a wrong column ([filter] hot_pixel_ratio, "
                "--event-columns)",
-               100 * fraction, key.first);
+               100 * fraction, index);
   }
 }
 
@@ -158,8 +158,8 @@ void checkCameraClocks(const Cameras& cameras, Warnings& warnings) {
       addWarning(warnings, "camera-clocks",
                  "camera {} has events from {} to {} s, camera {} from {} to {} s: have they "
                  "one clock, and are they of one recording? ([rig] time_offsets_s)",
-                 a->first.first, formatSeconds(*one.first_ns), formatSeconds(*one.last_ns),
-                 b->first.first, formatSeconds(*other.first_ns), formatSeconds(*other.last_ns));
+                 a->first, formatSeconds(*one.first_ns), formatSeconds(*one.last_ns), b->first,
+                 formatSeconds(*other.first_ns), formatSeconds(*other.last_ns));
     }
   }
 }
@@ -174,7 +174,7 @@ void checkTwins(const Cameras& cameras, Warnings& warnings) {
       addWarning(warnings, "same-events",
                  "cameras {} and {} have the same events in every pixel: is "
                  "one file given twice?",
-                 a->first.first, b->first.first);
+                 a->first, b->first);
     }
   }
 }
@@ -193,8 +193,8 @@ Warnings calibrationWarnings(int camera, const CameraModel& model) {
 void checkCameras(const Findings& findings, Warnings& warnings) {
   const Cameras& cameras = findings.recording.cameras();
   checkBaselines(cameras, warnings);
-  for (const auto& [key, camera] : cameras) {
-    append(warnings, calibrationWarnings(key.first, camera.camera.model));
+  for (const auto& [index, camera] : cameras) {
+    append(warnings, calibrationWarnings(index, camera.camera.model));
   }
   checkActivity(cameras, warnings);
   checkHotPixels(cameras, warnings);

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/event_fusion_options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "mapping/base/option.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "plugin/recordings/streams/sample.h"
 
 namespace efm {
-
-RigSetup readRigSetup(const RigOptions& options) {
-  return options.setup ? *options.setup : readRigSetup(options.calibration, options.hand_eye);
-}
 
 void EventFusionOptions::validate() const {
   mapper.validate();
@@ -24,6 +23,30 @@ void EventFusionOptions::validate() const {
 std::size_t EventFusionOptions::movableKeyframes() const {
   if (!refinement.enabled) return 0;
   return live.enabled ? static_cast<std::size_t>(live.max_keyframes) : RefinedCloud::kAll;
+}
+
+void requireCalibrated(int camera, const CameraModel& model) {
+  if (isCalibrated(model)) return;
+  throw OptionHint(
+      fmt::format(
+          "camera {} has no calibration: a map needs --calibration FILE ([rig] calibration)",
+          camera),
+      {{"rig", "calibration"}});
+}
+
+void requireMappable(const Rig& rig, const EventFusionOptions& options) {
+  const auto count = static_cast<int>(rig.cameras.size());
+  for (int i = 0; i < count; ++i) {
+    const RigCamera& camera = rig.cameras[static_cast<std::size_t>(i)];
+    requireCalibrated(i, camera.model);
+    camera.validate();
+  }
+  const std::string expected = fmt::format("a camera of the recording: 0 to {}", count - 1);
+  for (const int camera : options.mapper.cameras) {
+    requireOption(camera < count, OptionName("rig", "cameras"), camera, expected);
+  }
+  const int reference = options.mapper.keyframe.reference_camera;
+  requireOption(reference < count, OptionName("dsi", "reference_camera"), reference, expected);
 }
 
 FusionMapperOptions mapperOptions(const EventFusionOptions& options) {

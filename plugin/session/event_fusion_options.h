@@ -24,12 +24,7 @@ struct RigOptions {
   std::filesystem::path hand_eye;             ///< Empty: from the recording.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
   std::string pose_source;  ///< The label of the source's sensor; empty: the best source.
-  std::shared_ptr<const RigSetup> setup =
-      nullptr;  ///< Content of both files, if they were read already.
 };
-
-/// @throws std::runtime_error naming a file that cannot be read or understood.
-RigSetup readRigSetup(const RigOptions& options);
 
 /// Live operation: mapping in a thread of its own beside a sensor that does not wait.
 struct LiveOptions {
@@ -108,6 +103,12 @@ struct EventFusionOptions {
 /// chosen from the first window.
 inline constexpr double kFirstWindowS = 1;
 inline constexpr double kFirstStrideS = 0.1;
+
+/// @throws std::invalid_argument naming the camera, if it has no calibration.
+void requireCalibrated(int camera, const CameraModel& model);
+/// @throws std::invalid_argument if a camera has no calibration, or the options name a camera that
+/// the rig does not have.
+void requireMappable(const Rig& rig, const EventFusionOptions& options);
 
 /// Returns the mapper's options, adapted to live operation and late fusion.
 FusionMapperOptions mapperOptions(const EventFusionOptions& options);

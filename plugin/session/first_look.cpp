@@ -29,17 +29,10 @@ std::int64_t periodOf(std::int64_t t_ns) {
   return t_ns / kPeriodNs - (t_ns % kPeriodNs < 0 ? 1 : 0);
 }
 
-EventPacket subsampled(const EventPacket& packet) {
-  double length_s = 0;
-  if (!packet.events.empty()) {
-    length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
-  }
-  const auto limit = static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s));
-  EventPacket chosen{
-      packet.camera,           packet.calibration, chosenEvenly(packet.events, limit),
-      packet.covered_until_ns, packet.t_ns,        packet.checked};
-  chosen.num_cameras = packet.num_cameras;
-  return chosen;
+std::vector<Event> subsampled(EventSpan events) {
+  const double length_s = secondsBetween(events.begin()->t_ns, (events.end() - 1)->t_ns);
+  return chosenEvenly(events,
+                      static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s)));
 }
 
 /// Returns the fraction of the depths that a fault between two cameras makes wrong, beside those
@@ -209,88 +202,72 @@ double eventRate(const WindowData& data) {
 }
 
 FirstLook::FirstLook(const EventFusionOptions& options)
-    : rig_(options),
+    : options_(options),
       pose_source_(options.rig.pose_source),
       mapper_(surveyOptions(mapperOptions(options), kWindowS)) {}
 
-void FirstLook::addEvents(const EventPacket& packet) {
-  received_ += packet.events.size();
-  const auto isEarlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
-  Waiting& waiting = waiting_[packet.camera];
-  if (!packet.events.empty() && !packet.checked) {  // rejected as the mapping rejects it
-    requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
-    const auto [oldest, newest] =
-        std::minmax_element(packet.events.begin(), packet.events.end(), isEarlier);
-    if (oldest->t_ns < waiting.newest_ns - kMaxEventDelayNs)
-      reject(*oldest, packet.camera, "too old");
-    if (newest->t_ns > kEndOfTimeNs) reject(*newest, packet.camera, "beyond all times");
+bool FirstLook::take(const Rig& rig) {
+  try {
+    requireMappable(rig, options_);
+    for (const RigCamera& camera : rig.cameras) mapper_.addCamera(camera);
+  } catch (const std::invalid_argument&) {
+    takes_ = false;
   }
-  const std::vector<Event> earlier = std::move(waiting.packet.events);
-  waiting.packet = packet;
-  std::vector<Event>& events = waiting.packet.events;
-  events.insert(events.begin(), earlier.begin(), earlier.end());
+  return takes_;
+}
+
+void FirstLook::addEvents(const EventPacket& packet) {
+  const auto isEarlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
+  const int camera = packet.camera;
+  const RigCamera& calibration = mapper_.rig().cameras.at(static_cast<std::size_t>(camera));
+  received_ += packet.events.size();
+  Waiting& waiting = waiting_[camera];
+  std::vector<Event>& events = waiting.events;
+  events.insert(events.end(), packet.events.begin(), packet.events.end());
   if (!std::is_sorted(events.begin(), events.end(), isEarlier)) {
     std::stable_sort(events.begin(), events.end(), isEarlier);
   }
   if (!events.empty()) waiting.newest_ns = std::max(waiting.newest_ns, events.back().t_ns);
-  addPeriods(waiting.packet, std::max(waiting.newest_ns - kMaxEventDelayNs,
-                                      packet.covered_until_ns.value_or(-kEndOfTimeNs)));
-  const bool begins =
-      !packet.events.empty() &&
-      rig_.isReady(trajectoryTime(packet.events.front().t_ns, packet.calibration.time_offset_ns),
-                   pose_source_.selected().has_value());
-  if (begins) completeRig();
+  addPeriods(camera, std::max(waiting.newest_ns - kMaxEventDelayNs,
+                              packet.complete_until_ns.value_or(-kEndOfTimeNs)));
+  if (packet.complete_until_ns) {
+    const std::int64_t waits_ns = events.empty() ? kMaxTimeNs : events.front().t_ns;
+    mapper_.setCompleteUntil(camera, std::min(*packet.complete_until_ns, waits_ns));
+  }
+  if (!packet.events.empty()) {
+    extend(begins_, packet.events.front().t_ns + calibration.time_offset_ns);
+    if (begins_->last_ns - begins_->first_ns > kMaxSourceWaitNs) usePoses(pose_source_.select());
+  }
   takeWindows();
 }
 
 /// Adds the periods of a camera's waiting events that end before a time.
-void FirstLook::addPeriods(EventPacket& waiting, std::int64_t complete_ns) {
+void FirstLook::addPeriods(int camera, std::int64_t complete_ns) {
   const auto inPeriod = [](const Event& a, const Event& b) {
     return periodOf(a.t_ns) < periodOf(b.t_ns);
   };
-  const auto end = std::partition_point(
-      waiting.events.begin(), waiting.events.end(), [complete_ns](const Event& event) {
+  std::vector<Event>& events = waiting_[camera].events;
+  const auto end =
+      std::partition_point(events.begin(), events.end(), [complete_ns](const Event& event) {
         return (periodOf(event.t_ns) + 1) * kPeriodNs <= complete_ns;
       });
-  const std::vector<Event> complete(waiting.events.begin(), end);
-  waiting.events.erase(waiting.events.begin(), end);  // also if one is rejected
-  EventPacket period = waiting;
-  period.events.clear();
-  period.covered_until_ns.reset();
+  const std::vector<Event> complete(events.begin(), end);
+  events.erase(events.begin(), end);  // also if one is rejected
+  const std::int64_t offset_ns =
+      mapper_.rig().cameras[static_cast<std::size_t>(camera)].time_offset_ns;
   for (auto first = complete.begin(); first != complete.end();) {
-    if (!period.events.empty()) add(period);
     const auto last = std::upper_bound(first, complete.end(), *first, inPeriod);
-    period.events.assign(first, last);
-    period.t_ns = first->t_ns;
+    std::vector<Event> chosen = subsampled({&*first, &*first + (last - first)});
+    extend(events_, chosen.front().t_ns + offset_ns);
+    extend(events_, chosen.back().t_ns + offset_ns);
+    mapper_.addEvents(camera, CheckedEvents(std::move(chosen)));
     first = last;
   }
-  period.covered_until_ns = waiting.covered_until_ns;
-  if (period.covered_until_ns && !waiting.events.empty()) {
-    period.covered_until_ns = std::min(*period.covered_until_ns, waiting.events.front().t_ns);
-  }
-  if (!period.events.empty() || period.covered_until_ns || waiting.events.empty()) add(period);
-}
-
-void FirstLook::add(const EventPacket& packet) {
-  for (EventPacket& ready : rig_.add(subsampled(packet), mapper_)) feed(std::move(ready));
-}
-
-void FirstLook::feed(EventPacket packet) {
-  const std::int64_t offset_ns = packet.calibration.time_offset_ns;
-  const bool empty = packet.events.empty();
-  const std::int64_t begin_ns = empty ? 0 : packet.events.front().t_ns + offset_ns;
-  const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns + offset_ns;
-  mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
-  if (packet.covered_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.covered_until_ns);
-  if (empty) return;
-  extend(events_, begin_ns);
-  extend(events_, last_ns);
 }
 
 void FirstLook::addPose(const PoseSample& pose) {
-  const std::optional<Rigid3>& given = rig_.setup().T_body_rig;
-  lever_m_ = std::max(lever_m_, given.value_or(pose.T_body_rig).translation.norm());
-  usePoses(pose_source_.add(pose.source, {pose.t_ns, rigPose(pose, given)}));
+  lever_m_ = std::max(lever_m_, pose.T_body_rig.translation.norm());
+  usePoses(pose_source_.add(pose.source, {pose.t_ns, pose.T_world_rig()}));
   takeWindows();
 }
 
@@ -301,15 +278,8 @@ void FirstLook::usePoses(const std::vector<StampedPose>& poses) {
   }
 }
 
-void FirstLook::completeRig() {
-  if (rig_.isComplete()) return;
-  rig_.requireOptionsFit();
-  usePoses(pose_source_.select());
-  rig_.complete();
-}
-
 void FirstLook::takeWindows() {
-  if (!rig_.isComplete()) return;
+  if (mapper_.rig().cameras.empty()) return;
   while (const std::optional<WindowData> data = mapper_.window()) {
     keep(*data);
     mapper_.skipWindow(data->window);
@@ -334,10 +304,8 @@ bool FirstLook::take(const Sample& sample) {
 
 RecordingSurvey FirstLook::finish() {
   try {
-    for (auto& [camera, waiting] : waiting_) addPeriods(waiting.packet, kMaxTimeNs);
+    for (const auto& [camera, waiting] : waiting_) addPeriods(camera, kMaxTimeNs);
     usePoses(pose_source_.select());
-    completeRig();
-    rig_.requireNoneWaits();
     takeWindows();
     mapper_.finish();
     if (samples_.samples().empty()) {

@@ -13,7 +13,6 @@
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/map_quality.h"
 #include "plugin/session/pose_source_selector.h"
-#include "plugin/session/rig_assembly.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -58,6 +57,8 @@ class FirstLook {
  public:
   explicit FirstLook(const EventFusionOptions& options);
 
+  /// Adds all cameras, before the first events. @return false if a MappingSession rejects them.
+  bool take(const Rig& rig);
   /// @throws std::exception if a MappingSession rejects the input, too.
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
@@ -68,24 +69,22 @@ class FirstLook {
   RecordingSurvey finish();
 
  private:
-  void addPeriods(EventPacket& waiting, std::int64_t complete_ns);
-  void add(const EventPacket& packet);
-  void feed(EventPacket packet);
+  void addPeriods(int camera, std::int64_t complete_ns);
   void usePoses(const std::vector<StampedPose>& poses);
-  void completeRig();
   void takeWindows();
   void keep(const WindowData& data);
 
-  RigAssembly rig_;
-  /// The newest packet of a camera, with all its events whose period may not be complete.
+  EventFusionOptions options_;
+  /// The events of a camera whose period may not be complete.
   struct Waiting {
-    EventPacket packet;
+    std::vector<Event> events;
     std::int64_t newest_ns = -kEndOfTimeNs;
   };
   std::map<int, Waiting> waiting_;  // by camera
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   SpreadSamples samples_;
+  std::optional<TimeSpan> begins_;          // of the packets
   std::optional<TimeSpan> events_, poses_;  // of the data that the mapper took
   bool takes_ = true;
   std::uint64_t received_ = 0;

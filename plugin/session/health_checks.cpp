@@ -141,12 +141,12 @@ void checkSpeeds(const Findings& findings, Warnings& warnings) {
 /// Warns of missing parts before a map. With a map, missing parts are an error.
 void checkParts(const Findings& findings, Warnings& warnings) {
   if (findings.session) return;
-  std::map<int, CameraModel> cameras;
-  for (const auto& [key, camera] : findings.recording.cameras()) {
-    cameras.emplace(key.first, camera.camera.model);
+  Rig rig;
+  for (const auto& [index, camera] : findings.recording.cameras()) {
+    rig.cameras.push_back(camera.camera);
   }
-  warnings = missingParts(cameras, findings.events().has_value(),
-                          findings.recording.usedPoses() != nullptr);
+  warnings =
+      missingParts(rig, findings.events().has_value(), findings.recording.usedPoses() != nullptr);
 }
 
 void checkDepths(const Findings& findings, Warnings& warnings) {
@@ -198,14 +198,13 @@ std::vector<Warning> warningsOf(const Findings& findings) {
   return warnings;
 }
 
-std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
-                                  bool has_poses) {
+std::vector<Warning> missingParts(const Rig& rig, bool has_events, bool has_poses) {
   Warnings warnings;
   if (!has_events) warnings.push_back({"no-events", "there are no events"});
-  for (const auto& [index, model] : cameras) {
-    if (isCalibrated(model)) continue;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    if (isCalibrated(rig.cameras[i].model)) continue;
     addWarning(warnings, "no-calibration",
-               "camera {} has no calibration: a map needs --calibration", index);
+               "camera {} has no calibration: a map needs --calibration", i);
   }
   if (!has_poses) warnings.push_back({"no-poses", "there are no poses: a map needs --poses"});
   return warnings;

@@ -125,9 +125,7 @@ void checkMotion(const Findings& findings, std::vector<Warning>& warnings);
 void checkSession(const Findings& findings, std::vector<Warning>& warnings);
 
 /// Returns a warning for each missing part of a recording: events, calibration, poses.
-/// @param cameras by their index.
-std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
-                                  bool has_poses);
+std::vector<Warning> missingParts(const Rig& rig, bool has_events, bool has_poses);
 
 /// Returns the warnings of the readers, and those of lost packets, of events without a time and of
 /// skipped events.

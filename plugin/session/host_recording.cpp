@@ -18,6 +18,7 @@ class HostRecording : public Recording {
   std::optional<Sample> read() override { return of_->read(); }
   std::string damage() const override { return hostText(of_->damage(), HostFace::kRecording); }
   const Rig& rig() const override { return of_->rig(); }
+  std::vector<RecordedCamera> cameras() const override { return of_->cameras(); }
   std::string position() const override { return of_->position(); }
   double progress() const override { return of_->progress(); }
   RecordingCounts counts() const override {
@@ -43,16 +44,11 @@ std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path
 RecordingSource sourceOf(const std::vector<std::filesystem::path>& files,
                          const Overrides& overrides) {
   overrides.limits.validate();
-  const auto given = [](const char* name, const std::filesystem::path& file) {
-    return file.empty() ? std::string() : name + (" " + file.string());
-  };
   RecordingSource source;
   source.files = files;
   source.poses = overrides.poses;
   source.calibration = overrides.calibration;
   source.hand_eye = overrides.hand_eye;
-  source.calibration_given = given("calibration", overrides.calibration);
-  source.hand_eye_given = given("hand_eye", overrides.hand_eye);
   source.limits = overrides.limits;
   source.format = overrides.format;
   source.reader.topics = overrides.topics;

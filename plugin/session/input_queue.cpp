@@ -18,8 +18,8 @@ std::int64_t intervalOf(std::int64_t t_ns) {
   return t_ns / kIntervalNs - (t_ns % kIntervalNs < 0 ? 1 : 0);
 }
 
-std::uint64_t bytesOf(const EventPacket& packet) {
-  return sizeof(EventPacket) + packet.events.capacity() * sizeof(Event);
+std::uint64_t bytesOf(const QueuedPacket& packet) {
+  return sizeof(QueuedPacket) + packet.events.all().capacity() * sizeof(Event);
 }
 
 /// Compares without overflow, because times are not checked yet.
@@ -29,19 +29,13 @@ bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns 
              static_cast<std::uint64_t>(limit_ns);
 }
 
-EventPacket withoutEvents(const EventPacket& packet) {
-  EventPacket empty{packet.camera, packet.calibration, {}, packet.covered_until_ns};
-  empty.num_cameras = packet.num_cameras;
-  return empty;
-}
-
 }  // namespace
 
 EventBudget::EventBudget(double max_rate)
     : max_per_interval_(static_cast<std::size_t>(std::ceil(max_rate / 100))) {}
 
 std::vector<Event> EventBudget::pass(std::vector<Event> events,
-                                     std::optional<std::int64_t>& covered_until_ns) {
+                                     std::optional<std::int64_t>& complete_until_ns) {
   if (max_per_interval_ == 0) return events;
   std::vector<Event> passed;
   for (const Event& event : events) {
@@ -54,12 +48,12 @@ std::vector<Event> EventBudget::pass(std::vector<Event> events,
     }
     held_.push_back(event);
   }
-  if (!covered_until_ns) return passed;
-  if (intervalOf(*covered_until_ns) > interval_) endInterval(passed);
+  if (!complete_until_ns) return passed;
+  if (intervalOf(*complete_until_ns) > interval_) endInterval(passed);
   if (!held_.empty()) {
     const auto earlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
     const Event& oldest = *std::min_element(held_.begin(), held_.end(), earlier);
-    covered_until_ns = std::min({*covered_until_ns, interval_ * kIntervalNs, oldest.t_ns});
+    complete_until_ns = std::min({*complete_until_ns, interval_ * kIntervalNs, oldest.t_ns});
   }
   return passed;
 }
@@ -106,49 +100,63 @@ InputQueue::Camera& InputQueue::cameraOf(int index) {
   return cameras_.try_emplace(index, options_.max_event_rate).first->second;
 }
 
-void InputQueue::add(EventPacket packet) {
+void InputQueue::add(const Rig& rig) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  Camera& camera = cameraOf(packet.camera);
-  camera.counts.received += packet.events.size();
-  if (ended_) {
-    camera.counts.fates[EventFate::kAfterEnd] += packet.events.size();
-    return;
-  }
-  try {
-    if (!packet.checked) {
-      requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
-    }
-    if (camera.last && !isSame(camera.last->calibration, packet.calibration)) {
-      throw std::invalid_argument(
-          fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
-                      "earlier packets",
-                      packet.camera));
-    }
-  } catch (const std::invalid_argument&) {
-    camera.counts.fates[EventFate::kRejected] += packet.events.size();
-    throw;
-  }
-  takeAhead(camera, packet);
-  pass(camera, std::move(packet));
+  new_rig_ = rig_ = rig;
+  changed_.notify_one();
 }
 
-void InputQueue::pass(Camera& camera, EventPacket packet) {
-  packet.events = camera.budget.pass(std::move(packet.events), packet.covered_until_ns);
-  camera.last = withoutEvents(packet);
-  push(std::move(packet));
+void InputQueue::add(EventPacket packet) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  take(packet.camera, std::move(packet.events).take(), packet.complete_until_ns);
+}
+
+void InputQueue::add(int camera, std::vector<Event> events,
+                     std::optional<std::int64_t> complete_until_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    requirePossible(events, camera, rig_.cameras.at(static_cast<std::size_t>(camera)));
+  } catch (const std::invalid_argument&) {
+    QueueCounts& counts = cameraOf(camera).counts;
+    counts.received += events.size();
+    counts.fates[ended_ ? EventFate::kAfterEnd : EventFate::kRejected] += events.size();
+    throw;
+  }
+  take(camera, std::move(events), complete_until_ns);
+}
+
+void InputQueue::take(int index, std::vector<Event> events,
+                      std::optional<std::int64_t> complete_until_ns) {
+  Camera& camera = cameraOf(index);
+  camera.counts.received += events.size();
+  if (ended_) {
+    camera.counts.fates[EventFate::kAfterEnd] += events.size();
+    return;
+  }
+  takeAhead(index, events, complete_until_ns);
+  pass(index, std::move(events), complete_until_ns);
+}
+
+void InputQueue::pass(int index, std::vector<Event> events,
+                      std::optional<std::int64_t> complete_until_ns) {
+  Camera& camera = cameraOf(index);
+  events = camera.budget.pass(std::move(events), complete_until_ns);
+  camera.complete_until_ns = complete_until_ns;
+  push({{index, CheckedEvents(std::move(events)), complete_until_ns}});
 }
 
 /// Rejects each event that is far ahead of the events before and after it. An event at the end of
 /// the packet waits for the next packet. This packet decides about the waiting event.
-void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
-  std::vector<Event>& events = packet.events;
-  Stream<EventPacket>& stream = camera.stream;
+void InputQueue::takeAhead(int index, std::vector<Event>& events,
+                           std::optional<std::int64_t>& complete_until_ns) {
+  Camera& camera = cameraOf(index);
+  Stream<Event>& stream = camera.stream;
   const std::optional<std::int64_t> begin_ns =
-      events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
+      events.empty() ? complete_until_ns : std::optional(events.front().t_ns);
   const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
-  if (confirms || !events.empty()) {  // `covered_until_ns` alone rejects nothing
+  if (confirms || !events.empty()) {  // `complete_until_ns` alone rejects nothing
     if (auto waited = stream.finalize(confirms, camera.counts.fates[EventFate::kRejected])) {
-      pass(camera, std::move(*waited));
+      pass(index, {*waited}, std::nullopt);
     }
   }
   std::size_t kept = 0;
@@ -156,10 +164,10 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
     const Event event = events[i];
     if (stream.reached_ns && isFarAfter(event.t_ns, *stream.reached_ns)) {
       if (i + 1 == events.size()) {
-        stream.ahead = EventPacket{packet.camera, packet.calibration, {event}, std::nullopt};
+        stream.ahead = event;
         stream.ahead_ns = event.t_ns;
-        if (packet.covered_until_ns) {  // the packet may end with this event
-          packet.covered_until_ns = std::min(*packet.covered_until_ns, *stream.reached_ns);
+        if (complete_until_ns) {  // the packet may end with this event
+          complete_until_ns = std::min(*complete_until_ns, *stream.reached_ns);
         }
         continue;
       }
@@ -172,10 +180,10 @@ void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
     events[kept++] = event;
   }
   events.resize(kept);
-  if (packet.covered_until_ns) stream.follow(*packet.covered_until_ns);
+  if (complete_until_ns) stream.follow(*complete_until_ns);
 }
 
-void InputQueue::push(EventPacket packet) {
+void InputQueue::push(QueuedPacket packet) {
   events_ += packet.events.size();
   bytes_ += bytesOf(packet);
   packets_.push_back(std::move(packet));
@@ -189,7 +197,7 @@ bool InputQueue::isFull() const {
 }
 
 void InputQueue::dropOldest() {
-  const EventPacket& oldest = packets_.front();
+  const QueuedPacket& oldest = packets_.front();
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
   cameraOf(oldest.camera).counts.fates[EventFate::kQueueFull] += oldest.events.size();
@@ -202,18 +210,18 @@ void InputQueue::dropOldest() {
   packets_.pop_front();
 }
 
-EventPacket skippedPacket(const EventPacket& packet) {
-  EventPacket skipped{packet.camera, packet.calibration, {}};
-  skipped.skipped_until_ns = packet.events.back().t_ns + 1;
+QueuedPacket skippedPacket(int camera, const std::vector<Event>& events) {
+  QueuedPacket skipped{{camera, {}}};
+  skipped.skipped_until_ns = events.back().t_ns + 1;
   return skipped;
 }
 
-void InputQueue::skip(const EventPacket& packet) {
+void InputQueue::skip(int camera, const std::vector<Event>& events) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  QueueCounts& counts = cameraOf(packet.camera).counts;
-  counts.received += packet.events.size();
-  counts.fates[EventFate::kPaused] += packet.events.size();
-  if (!ended_ && !packet.events.empty()) push(skippedPacket(packet));
+  QueueCounts& counts = cameraOf(camera).counts;
+  counts.received += events.size();
+  counts.fates[EventFate::kPaused] += events.size();
+  if (!ended_ && !events.empty()) push(skippedPacket(camera, events));
 }
 
 void InputQueue::add(PoseSample pose) {
@@ -243,12 +251,11 @@ void InputQueue::end() {
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
     if (auto last = camera.stream.finalizeLast(camera.counts.fates[EventFate::kRejected])) {
-      pass(camera, std::move(*last));
+      pass(index, {*last}, std::nullopt);
     }
-    if (!camera.last) continue;
-    EventPacket rest = *camera.last;
-    rest.events = camera.budget.finish();
-    if (!rest.events.empty()) push(std::move(rest));
+    std::vector<Event> rest = camera.budget.finish();
+    if (rest.empty()) continue;
+    push({{index, CheckedEvents(std::move(rest)), camera.complete_until_ns}});
   }
   for (auto& [source, stream] : pose_streams_) {
     if (auto last = stream.finalizeLast(rejected_poses_)) poses_.push_back(std::move(*last));
@@ -265,7 +272,8 @@ void InputQueue::stop() {
 InputQueue::Batch InputQueue::wait(std::optional<Clock::time_point> until) {
   std::unique_lock<std::mutex> lock(mutex_);
   const auto has_input = [this] {
-    return stopped_ || ended_ || !packets_.empty() || !poses_.empty() || !missing_.empty();
+    return stopped_ || ended_ || new_rig_ || !packets_.empty() || !poses_.empty() ||
+           !missing_.empty();
   };
   if (until) {
     changed_.wait_until(lock, *until, has_input);
@@ -282,11 +290,12 @@ InputQueue::Batch InputQueue::take(bool all_mapped) {
 
 InputQueue::Batch InputQueue::takeLocked(bool all_mapped) {
   Batch batch;
+  batch.rig = std::exchange(new_rig_, std::nullopt);
   batch.poses = std::exchange(poses_, {});
   batch.missing = std::exchange(missing_, {});
   bool may_skip = all_mapped;  // until the first packet with events
   while (!packets_.empty() && (may_skip || !packets_.front().skipped_until_ns)) {
-    EventPacket& next = packets_.front();
+    QueuedPacket& next = packets_.front();
     may_skip = may_skip && next.skipped_until_ns;
     events_ -= next.events.size();
     bytes_ -= bytesOf(next);

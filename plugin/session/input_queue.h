@@ -21,7 +21,7 @@ namespace efm {
 /// clock, at most rate / 100 events pass, spread evenly (`EvenChoice`). The choice depends on the
 /// order of the events, not on the packets in which they arrive, nor on the machine.
 ///
-/// The events of the current 10 ms are held until a later event, or a packet's `covered_until_ns`,
+/// The events of the current 10 ms are held until a later event, or a packet's `complete_until_ns`,
 /// ends the interval. A late event, by less than a second, belongs to the current 10 ms. After a
 /// clock reset, the current interval is one of the new clock.
 class EventBudget {
@@ -29,10 +29,11 @@ class EventBudget {
   /// @param max_rate events per second; 0: all events pass at once.
   explicit EventBudget(double max_rate);
 
-  /// @param covered_until_ns no event before this time can still arrive; in: of the packet, out: of
-  /// the events that passed.
+  /// @param complete_until_ns no event before this time can still arrive; in: of the packet, out:
+  /// of the events that passed.
   /// @return the events that pass, of this packet and of earlier packets.
-  std::vector<Event> pass(std::vector<Event> events, std::optional<std::int64_t>& covered_until_ns);
+  std::vector<Event> pass(std::vector<Event> events,
+                          std::optional<std::int64_t>& complete_until_ns);
   /// Returns the held events that pass at the end.
   std::vector<Event> finish();
 
@@ -49,8 +50,14 @@ class EventBudget {
   std::uint64_t subsampled_ = 0;
 };
 
-/// Returns a packet without events that replaces a packet that is not to be mapped.
-EventPacket skippedPacket(const EventPacket& packet);
+/// A packet in the queue. In place of a packet that is not to be mapped, one without events.
+struct QueuedPacket : EventPacket {
+  /// End of the events that the host left out, on the camera's clock.
+  std::optional<std::int64_t> skipped_until_ns = std::nullopt;
+};
+
+/// Returns what replaces a packet that is not to be mapped.
+QueuedPacket skippedPacket(int camera, const std::vector<Event>& events);
 
 /// Input of a mapping that runs in another thread: subsampled, and bounded in events and in bytes.
 /// If the queue is full, its oldest packets are dropped, but never poses. Any thread adds; one
@@ -62,20 +69,24 @@ class InputQueue {
  public:
   explicit InputQueue(const LiveOptions& options);
 
-  /// @throws std::invalid_argument if an event lies outside the sensor, or the calibration differs
-  /// from the camera's earlier packets. The packet is rejected.
+  /// Adds all cameras, before the first events.
+  void add(const Rig& rig);
   void add(EventPacket packet);
+  /// Adds events that were not checked.
+  /// @throws std::invalid_argument if an event is not possible. All events are rejected.
+  void add(int camera, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
   void add(PoseSample pose);
-  /// Counts a packet that is not to be mapped, and adds its `skippedPacket`.
-  void skip(const EventPacket& packet);
+  /// Counts events that are not to be mapped, and adds their `skippedPacket`.
+  void skip(int camera, const std::vector<Event>& events);
   /// Ends the input. Packets and poses that are added later are counted only.
   void end();
   /// Wakes up the thread that takes. It does not wait again.
   void stop();
 
   struct Batch {
+    std::optional<Rig> rig;         ///< All cameras, once.
     std::vector<PoseSample> poses;  ///< In the order of arrival.
-    std::vector<EventPacket> packets;
+    std::vector<QueuedPacket> packets;
     /// Missing events of the cameras with dropped packets, which are older than `packets`.
     std::map<int, MissingEvents> missing;
     bool ended = false;
@@ -113,15 +124,17 @@ class InputQueue {
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
-    std::optional<EventPacket> last;  // last packet, without its events
-    Stream<EventPacket> stream;       // of events and `covered_until_ns`; one event may wait
+    std::optional<std::int64_t> complete_until_ns;  // of the last packet
+    Stream<Event> stream;  // of events and `complete_until_ns`; one event may wait
     QueueCounts counts;
   };
 
   Camera& cameraOf(int index);
-  void takeAhead(Camera& camera, EventPacket& packet);
-  void pass(Camera& camera, EventPacket packet);
-  void push(EventPacket packet);
+  void take(int index, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
+  void takeAhead(int index, std::vector<Event>& events,
+                 std::optional<std::int64_t>& complete_until_ns);
+  void pass(int index, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
+  void push(QueuedPacket packet);
   void dropOldest();
   bool isFull() const;
   Batch takeLocked(bool all_mapped);
@@ -130,8 +143,10 @@ class InputQueue {
 
   mutable std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
+  std::optional<Rig> new_rig_;  // not yet taken
+  Rig rig_;
   std::map<int, Camera> cameras_;
-  std::deque<EventPacket> packets_;
+  std::deque<QueuedPacket> packets_;
   std::vector<PoseSample> poses_;
   std::map<PoseSourceId, Stream<PoseSample>> pose_streams_;
   std::uint64_t rejected_poses_ = 0;

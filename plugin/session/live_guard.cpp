@@ -16,11 +16,13 @@ constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
 
 std::optional<std::int64_t> LiveGuard::admit(FusionMapper& mapper, EventPacket& packet) const {
   if (!options_.enabled) return std::nullopt;
-  if (mapper.isOlder(packet.camera, packet.events)) {
-    return trajectoryTime(packet.events.front().t_ns, packet.calibration.time_offset_ns);
-  }
-  mapper.dropLate(packet.camera, packet.events);
-  return std::nullopt;
+  const auto camera = static_cast<std::size_t>(packet.camera);
+  std::vector<Event> events = std::move(packet.events).take();
+  const bool older = mapper.isOlder(packet.camera, events);
+  if (!older) mapper.dropLate(packet.camera, events);
+  packet.events = CheckedEvents(std::move(events));
+  if (!older) return std::nullopt;
+  return trajectoryTime(packet.events.front().t_ns, mapper.rig().cameras.at(camera).time_offset_ns);
 }
 
 void LiveGuard::noteOlder(int sensor, std::int64_t t_ns) {

@@ -31,6 +31,9 @@ Mapper::~Mapper() = default;
 int Mapper::addCamera(const RigCamera& camera) {
   return forHost(kFace, [&] { return core_->addCamera(camera); });
 }
+void Mapper::addCameras(const Rig& rig) {
+  forHost(kFace, [&] { core_->addCameras(rig); });
+}
 void Mapper::addEvents(int camera, std::vector<Event> events) {
   forHost(kFace, [&] { core_->addEvents(camera, std::move(events)); });
 }

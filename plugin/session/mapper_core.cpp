@@ -27,11 +27,6 @@ std::string errorText() {
   }
 }
 
-EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const RigSetup> setup) {
-  options.rig.setup = std::move(setup);
-  return options;
-}
-
 std::vector<float> depthsIn(const cv::Mat1f& depth) {
   std::vector<float> depths_m;
   std::copy_if(depth.begin(), depth.end(), std::back_inserter(depths_m),
@@ -50,12 +45,13 @@ std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapper
 
 MapperCore::MapperCore(const EventFusionOptions& options, Callbacks callbacks,
                        const std::vector<StoredKeyframe>& earlier)
-    : options_(options.live),
+    : all_options_(options),
       checks_(options.checks),
       callbacks_(std::move(callbacks)),
-      setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
-      statistics_(statisticsOptions(withSetup(options, setup_))),
-      session_(withSetup(options, setup_)) {
+      setup_(
+          std::make_shared<RigSetup>(readRigSetup(options.rig.calibration, options.rig.hand_eye))),
+      statistics_(statisticsOptions(options)),
+      session_(options) {
   for (const StoredKeyframe& keyframe : earlier) {
     session_.insertEarlier(pointsInWorld(*keyframe.points, keyframe.T_world_ref),
                            keyframe.T_world_ref);
@@ -93,48 +89,69 @@ MapperCore::~MapperCore() {
 int MapperCore::addCamera(const RigCamera& camera) {
   camera.validate();
   const std::lock_guard<std::mutex> lock(cameras_mutex_);
-  if (announced_) throw std::logic_error("a camera was added after the first events");
-  cameras_.push_back(camera);
-  return static_cast<int>(cameras_.size()) - 1;
+  if (rig_is_fixed_) throw std::logic_error("a camera was added after the first events");
+  given_rig_.cameras.push_back(camera);
+  return static_cast<int>(given_rig_.cameras.size()) - 1;
 }
 
-void MapperCore::addEvents(int camera, std::vector<Event> events) {
+void MapperCore::addCameras(const Rig& rig) {
+  const std::lock_guard<std::mutex> lock(cameras_mutex_);
+  if (!given_rig_.cameras.empty()) {
+    const std::vector<RigCamera>& given = given_rig_.cameras;
+    if (!std::equal(given.begin(), given.end(), rig.cameras.begin(), rig.cameras.end(),
+                    [](const RigCamera& a, const RigCamera& b) { return isSame(a, b); })) {
+      throw std::invalid_argument("the cameras differ from those that were added before");
+    }
+  }
+  if (!rig_is_fixed_) fixRig(rig);
+}
+
+/// Gives the cameras to the session. @throws std::invalid_argument if they do not fit the options.
+void MapperCore::fixRig(const Rig& given) {
+  const Rig rig = calibrated(given, *setup_, all_options_.rig.time_offsets_ns);
+  requireMappable(rig, all_options_);
+  if (queue_) {
+    queue_->add(rig);
+  } else {
+    Batch batch;
+    batch.rig = rig;
+    std::exception_ptr error;
+    feed(std::move(batch), error);
+    if (error) std::rethrow_exception(error);
+    for (const RigCamera& camera : rig.cameras) {
+      intakes_.emplace_back(static_cast<int>(intakes_.size()), camera);
+    }
+  }
+  given_rig_ = given;
+  rig_is_fixed_ = true;
+  const std::lock_guard<std::mutex> lock(statistics_mutex_);
+  statistics_.setCameras(rig, {});
+}
+
+void MapperCore::addEvents(int camera, std::vector<Event> events,
+                           std::optional<std::int64_t> complete_until_ns) {
   const auto index = static_cast<std::size_t>(camera);
-  EventPacket packet;
+  EventPacket packet{camera, {}, complete_until_ns};
   {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
-    if (index >= cameras_.size()) {
+    if (index >= given_rig_.cameras.size()) {
       throw std::invalid_argument(
           fmt::format("events of camera {}: there are {} cameras: expected a camera that was added",
-                      camera, cameras_.size()));
+                      camera, given_rig_.cameras.size()));
     }
-    packet.num_cameras = static_cast<int>(cameras_.size());
-    if (!std::exchange(announced_, true)) announce(packet);
-    packet.calibration = cameras_[index];
-  }
-  packet.camera = camera;
-  packet.events = std::move(events);
-  if (queue_) return queue_->add(std::move(packet));
-  Batch batch;
-  batch.packets.push_back(std::move(packet));
-  workHere(std::move(batch), true);
-}
-
-/// Adds an empty packet of each camera. It maps nothing, so no callback waits for cameras_mutex_.
-void MapperCore::announce(EventPacket packet) {
-  Batch batch;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    packet.camera = static_cast<int>(c);
-    packet.calibration = cameras_[c];
-    if (queue_) {
-      queue_->add(packet);
-    } else {
-      batch.packets.push_back(packet);
+    if (!rig_is_fixed_) fixRig(Rig(given_rig_));
+    if (queue_) return queue_->add(camera, std::move(events), complete_until_ns);
+    EventIntake& intake = intakes_[index];
+    packet.events = intake.add(std::move(events));
+    if (complete_until_ns) {
+      packet.complete_until_ns = std::min(*complete_until_ns, intake.waitsSinceNs());
     }
+    const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
+    statistics_.addEvents(packet);
   }
-  std::exception_ptr error;
-  if (!queue_) feed(std::move(batch), error);
-  if (error) std::rethrow_exception(error);
+  Batch batch;
+  batch.packets.push_back({std::move(packet)});
+  workHere(std::move(batch));
 }
 
 std::vector<Warning> MapperCore::warnings() {
@@ -152,8 +169,14 @@ std::vector<Warning> MapperCore::warnings() {
     const std::lock_guard<std::mutex> lock(statistics_mutex_);
     statistics = statistics_;
   }
-  statistics.setCameras(state.rig.cameras);
   Findings findings{statistics, {}};
+  {
+    const std::lock_guard<std::mutex> lock(cameras_mutex_);
+    for (const EventIntake& intake : intakes_) {
+      if (findings.read.first_skipped.empty()) findings.read.first_skipped = intake.firstWrong();
+      findings.read.skipped_events += intake.wrongEvents();
+    }
+  }
   findings.use(options.keyframe.planes, state.chosen);
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
   findings.checks = checks_;
@@ -216,25 +239,40 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
 void MapperCore::add(Sample sample) {
   auto* const packet = std::get_if<EventPacket>(&sample);
   auto* const pose = std::get_if<PoseSample>(&sample);
+  if (packet) {
+    const std::lock_guard<std::mutex> lock(cameras_mutex_);
+    if (!rig_is_fixed_ || std::size_t(packet->camera) >= given_rig_.cameras.size()) {
+      throw std::invalid_argument(fmt::format(
+          "a packet of camera {}: expected addCameras(recording.rig()) before it", packet->camera));
+    }
+  }
+  if (pose && setup_->T_body_rig) pose->T_body_rig = *setup_->T_body_rig;
+  if (pose) {
+    const std::lock_guard<std::mutex> lock(cameras_mutex_);
+    extend(pose_times_, pose->t_ns);
+    for (EventIntake& intake : intakes_) {
+      intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);
+    }
+  }
   if (queue_) {
     if (packet) queue_->add(std::move(*packet));
     if (pose) queue_->add(std::move(*pose));
     return;
   }
   Batch batch;
-  if (packet) batch.packets.push_back(std::move(*packet));
+  if (packet) batch.packets.push_back({std::move(*packet)});
   if (pose) batch.poses.push_back(std::move(*pose));
   workHere(std::move(batch));
 }
 
-void MapperCore::skip(const EventPacket& packet) {
-  if (queue_) return queue_->skip(packet);
-  if (packet.events.empty()) return;
+void MapperCore::skip(int camera, const std::vector<Event>& events) {
+  if (queue_) return queue_->skip(camera, events);
+  if (events.empty()) return;
   Batch batch;
-  batch.packets.push_back(skippedPacket(packet));
+  batch.packets.push_back(skippedPacket(camera, events));
   {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
-    paused_events_[packet.camera] += packet.events.size();
+    paused_events_[camera] += events.size();
   }
   workHere(std::move(batch));
 }
@@ -244,6 +282,15 @@ void MapperCore::finish() {
   if (!queue_) {
     Batch end;
     end.ended = true;
+    {
+      const std::lock_guard<std::mutex> lock(cameras_mutex_);
+      for (EventIntake& intake : intakes_) {
+        const auto camera = static_cast<int>(&intake - intakes_.data());
+        EventPacket& rest = end.packets.emplace_back(QueuedPacket{{camera, intake.finish()}});
+        const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
+        statistics_.addEvents(rest);
+      }
+    }
     workHere(std::move(end));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -275,11 +322,10 @@ void MapperCore::stop() {
 }
 
 /// Feeds and maps a batch in the caller's thread.
-/// @param own_events true for events of `addEvents`, which the warnings judge.
-void MapperCore::workHere(Batch batch, bool own_events) {
+void MapperCore::workHere(Batch batch) {
   const auto kept = weak_from_this().lock();  // a callback may drop the last reference
   std::exception_ptr error;
-  feed(std::move(batch), error, own_events);
+  feed(std::move(batch), error);
   while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
   }
   if (error) std::rethrow_exception(error);
@@ -332,13 +378,16 @@ void MapperCore::endRun(std::exception_ptr error) {
 /// Feeds the session.
 /// @param error receives the first error; in live operation only an error of the end, because
 /// `attempt` counts and logs the others.
-void MapperCore::feed(Batch batch, std::exception_ptr& error, bool own_events) {
+void MapperCore::feed(Batch batch, std::exception_ptr& error) {
   std::exception_ptr ignored;
   std::exception_ptr& of_input = queue_ ? ignored : error;
   {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
     if (finished_ && !queue_ && !batch.ended) {
       throw std::logic_error("input after the end: `finish` was called");
+    }
+    if (batch.rig) {
+      attempt(of_input, Fault::kMapping, "the cameras", [&] { session_.addCameras(*batch.rig); });
     }
     for (const PoseSample& pose : batch.poses) {
       attempt(of_input, Fault::kPose, "", [&] {
@@ -351,17 +400,13 @@ void MapperCore::feed(Batch batch, std::exception_ptr& error, bool own_events) {
       attempt(of_input, Fault::kMapping, "the choice of options",
               [&] { session_.noteMissing(missing.first, missing.second); });
     }
-    for (EventPacket& packet : batch.packets) {
+    for (QueuedPacket& packet : batch.packets) {
       attempt(of_input, Fault::kEvents, "", [&] {
         if (packet.skipped_until_ns) {
           session_.noteMissing(packet.camera, {*packet.skipped_until_ns, DropReason::kPaused});
           return;
         }
-        const EventPacket own = own_events ? packet : EventPacket();
         session_.addEvents(std::move(packet));
-        if (!own_events) return;
-        const std::lock_guard<std::mutex> events_lock(statistics_mutex_);
-        statistics_.addEvents(own);
       });
     }
     if (batch.ended && !std::exchange(finished_, true)) {

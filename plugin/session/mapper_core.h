@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "event_fusion/engine.h"
+#include "mapping/events/event_checker.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/recordings/streams/sample.h"
@@ -78,10 +79,13 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   MapperCore& operator=(const MapperCore&) = delete;
 
   int addCamera(const RigCamera& camera);
-  void addEvents(int camera, std::vector<Event> events);
+  void addCameras(const Rig& rig);
+  /// @param complete_until_ns see EventPacket.
+  void addEvents(int camera, std::vector<Event> events,
+                 std::optional<std::int64_t> complete_until_ns = std::nullopt);
   void add(Sample sample);
-  /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
-  void skip(const EventPacket& packet);
+  /// Counts events that are not to be mapped. The windows that need them are dropped.
+  void skip(int camera, const std::vector<Event>& events);
   void finish();
   void stop();
   /// Returns the options of the map, with the chosen voxel size.
@@ -97,8 +101,8 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   /// processor time of the process.
   void setClock(ProcessorClock clock);
 
-  /// Returns the pose of the rig on the tracked body, from the options.
-  const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
+  /// Returns the files of the rig that the options name.
+  const RigSetup& setup() const { return *setup_; }
   SessionStatus status() const;
   std::vector<Warning> warnings();
   std::shared_ptr<const MapSnapshot> newest(bool with_points);
@@ -115,11 +119,11 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   // Functions of the worker: a caller's thread in playback, otherwise the mapper's thread.
   FusionMapperOptions usedOptions() const;
   void noteEnd(std::exception_ptr& error);
-  void workHere(Batch batch, bool own_events = false);
-  void announce(EventPacket packet);
+  void workHere(Batch batch);
+  void fixRig(const Rig& given);
   void run();
   bool runOnce();
-  void feed(Batch batch, std::exception_ptr& error, bool own_events = false);
+  void feed(Batch batch, std::exception_ptr& error);
   bool mapNext(std::exception_ptr& error);
   void endRun(std::exception_ptr error);
   void keep(StoredKeyframe keyframe);
@@ -136,17 +140,20 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   void noteError(const char* doing, Fault fault) noexcept;
   void warnOfLosses();
 
-  const LiveOptions options_;
+  const EventFusionOptions all_options_;
+  const LiveOptions& options_ = all_options_.live;
   const bool checks_;
   const Callbacks callbacks_;
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;
-  std::mutex cameras_mutex_;               // guards the cameras that the host adds
-  std::vector<RigCamera> cameras_;         // by `addCamera`
-  bool announced_ = false;                 // the session knows them
+  mutable std::mutex cameras_mutex_;       // guards the four members below
+  Rig given_rig_;                          // as the host gave it
+  std::vector<EventIntake> intakes_;       // one per camera, in playback
+  std::optional<TimeSpan> pose_times_;     // which confirm events
+  bool rig_is_fixed_ = false;              // the session knows the cameras
   mutable std::mutex statistics_mutex_;    // guards statistics_; held for copies only
-  RecordingStatistics statistics_;         // of the poses, and in playback of own events
+  RecordingStatistics statistics_;         // of the poses, and in playback of added events
   std::atomic<std::thread::id> worker_{};  // its thread in live operation
   std::mutex join_mutex_;                  // guards thread_
 

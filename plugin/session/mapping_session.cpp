@@ -49,18 +49,22 @@ class StageTimer : public StageHook {
 MappingSession::MappingSession(const EventFusionOptions& options)
     : automatic_(options.automatic),
       options_(options),
-      rig_(options),
       pose_source_(options.rig.pose_source),
       guard_(options.live),
       mapper_(mapperOptions(options)),
       cloud_(options.cloud, options.movableKeyframes()) {
-  rig_.declare(mapper_);
   if (!options.live.enabled && options.automatic.any()) {  // live operation cannot look ahead
     first_look_ = std::make_unique<FirstLook>(options);
   }
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }
+}
+
+void MappingSession::addCameras(const Rig& rig) {
+  const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
+  if (first_look_) first_look_->take(rig);
+  for (const RigCamera& camera : rig.cameras) mapper_.addCamera(camera);
 }
 
 void MappingSession::addEvents(EventPacket packet) {
@@ -71,47 +75,33 @@ void MappingSession::addEvents(EventPacket packet) {
   }
   if (first_look_) look([&] { first_look_->addEvents(packet); });
   const int camera = packet.camera;
-  const std::size_t events = packet.events.size();
-  std::vector<EventPacket> packets;
+  const std::uint64_t complete = mapper_.readEvents() + packet.events.size();
+  std::optional<std::int64_t> older_ns;
   try {
-    const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
-    packets = rig_.add(std::move(packet), mapper_);
-  } catch (...) {
-    status_.rejected_events[camera] += events;
+    older_ns = guard_.admit(mapper_, packet);
+    feed(std::move(packet));
+  } catch (...) {  // contradicts its camera, or no memory
+    status_.rejected_events[camera] += complete - mapper_.readEvents();
+    if (older_ns) guard_.noteOlder(camera, *older_ns);
     throw;
   }
-  // If a packet is rejected, the others are used all the same.
-  std::exception_ptr rejection;
-  for (EventPacket& ready : packets) {
-    const int ready_camera = ready.camera;
-    const std::uint64_t complete = mapper_.readEvents() + ready.events.size();
-    std::optional<std::int64_t> older_ns;
-    try {
-      older_ns = guard_.admit(mapper_, ready);
-      feed(std::move(ready));
-    } catch (...) {  // contradicts its camera, or no memory
-      status_.rejected_events[ready_camera] += complete - mapper_.readEvents();
-      if (!rejection) rejection = std::current_exception();
-      if (older_ns) guard_.noteOlder(ready_camera, *older_ns);
-      if (!rig_.isComplete()) beginClock();  // with a complete rig, `next` does this
-    }
-  }
-  if (rejection) std::rethrow_exception(rejection);
 }
 
 void MappingSession::feed(EventPacket packet) {
-  const std::int64_t offset_ns = packet.calibration.time_offset_ns;
+  const std::int64_t offset_ns =
+      mapper_.rig().cameras.at(static_cast<std::size_t>(packet.camera)).time_offset_ns;
   const bool empty = packet.events.empty();
   const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
   {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
-    mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
+    mapper_.addEvents(packet.camera, std::move(packet.events));
   }
-  if (packet.covered_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.covered_until_ns);
+  if (packet.complete_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.complete_until_ns);
   if (empty) {
-    if (!packet.covered_until_ns) return;
-    guard_.dropMissing(mapper_, packet.camera, trajectoryTime(*packet.covered_until_ns, offset_ns));
+    if (!packet.complete_until_ns) return;
+    guard_.dropMissing(mapper_, packet.camera,
+                       trajectoryTime(*packet.complete_until_ns, offset_ns));
     return;
   }
   guard_.dropMissing(mapper_, packet.camera, std::max(first_ns, last_ns) + offset_ns);
@@ -122,18 +112,10 @@ void MappingSession::feed(EventPacket packet) {
   extend(status_.events, last_ns + offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   guard_.dropOverdue(mapper_, *newest_begin_ns_);
-  if (rig_.isComplete()) return;
-  std::uint64_t held = mapper_.heldEvents();
-  for (const auto& [camera, events] : rig_.waitingEvents()) held += events;
-  const bool ready = rig_.isReady(begin_ns, pose_source_.selected().has_value());
-  if (ready || guard_.fillsQueue(held)) completeRig();
-}
-
-void MappingSession::completeRig() {
-  if (rig_.isComplete()) return;
-  rig_.requireOptionsFit();
-  useSelected();
-  rig_.complete();
+  if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs ||
+      guard_.fillsQueue(mapper_.heldEvents())) {
+    useSelected();
+  }
 }
 
 void MappingSession::addPose(const PoseSample& sample) {
@@ -148,14 +130,13 @@ void MappingSession::addPose(const PoseSample& sample) {
     return;
   }
   if (first_look_) look([&] { first_look_->addPose(sample); });
-  const StampedPose pose{sample.t_ns, rigPose(sample, rig_.setup().T_body_rig)};
+  const StampedPose pose{sample.t_ns, sample.T_world_rig()};
   const PoseSourceId& source = sample.source;
   const std::vector<StampedPose> poses = pose_source_.add(source, pose);
   try {
     for (const StampedPose& next : poses) usePose({next, sample.noise});
   } catch (const std::invalid_argument&) {
     guard_.noteOlderPose(pose.t_ns);
-    if (!rig_.isComplete()) beginClock();
     throw;
   }
   if (!poses.empty()) guard_.noteInTime(LiveGuard::kTracker, pose.t_ns);
@@ -252,7 +233,6 @@ void MappingSession::restartMapper() {
   mapper_.dropAllWindows(DropReason::kClockReset);
   earlier_counts_ += mapper_.counts();
   mapper_ = std::move(fresh);
-  rig_.beginClock();
   segment_ = {};
   status_.events.reset();
   newest_begin_ns_.reset();
@@ -274,9 +254,6 @@ void MappingSession::finishMapper() {
 void MappingSession::finish() {
   finished_ = true;
   guard_.dropAllMissing(mapper_);
-  for (const auto& [camera, events] : rig_.waitingEvents()) {
-    status_.rejected_events[camera] += events;
-  }
   std::exception_ptr error;
   try {
     useSelected();
@@ -284,8 +261,6 @@ void MappingSession::finish() {
     error = std::current_exception();
   }
   finishMapper();
-  completeRig();
-  rig_.requireNoneWaits();
   if (error) std::rethrow_exception(error);
 }
 
@@ -308,7 +283,7 @@ void MappingSession::limitHeld(double max_events) {
 }
 
 std::optional<Window> MappingSession::nextWindow() {
-  if (!rig_.isComplete() || options_.automatic.any()) return std::nullopt;
+  if (!hasCameras() || options_.automatic.any()) return std::nullopt;
   return mapper_.nextWindow();
 }
 
@@ -334,7 +309,7 @@ void MappingSession::dropOlderHalf() {
                             : rate * policy.window_s;
   const double queue_events = options_.live.queueEvents();
   const bool too_large =  // because of its own rate, not of other waiting events
-      rig_.isComplete() && !options_.automatic.any() && needed > queue_events &&
+      hasCameras() && !options_.automatic.any() && needed > queue_events &&
       static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
   if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
   mapper_.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
@@ -363,7 +338,8 @@ bool MappingSession::dropFailedWindow() {
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,
                                                      const KeyframeStore& store) {
   keyframe_lost_ = false;
-  if (!rig_.isComplete() || !chooseAutomatic()) {
+  if (!hasCameras()) beginClock();
+  if (!hasCameras() || !chooseAutomatic()) {
     limitWaits();
     return std::nullopt;
   }

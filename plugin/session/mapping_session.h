@@ -19,14 +19,12 @@
 #include "plugin/session/map_quality.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"
-#include "plugin/session/rig_assembly.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
 
 /// Turns packets of events and poses, in the order of a recording, into keyframes and the global
-/// cloud: assembles the rig as its cameras appear, feeds the mapper and inserts its keyframes. Not
-/// thread-safe. Knows nothing of MRPT.
+/// cloud: feeds the mapper and inserts its keyframes. Not thread-safe. Knows nothing of MRPT.
 ///
 /// In playback, automatic options are chosen from the whole recording, with the same code as in
 /// `event-fusion map`, which reads the recording twice. Nothing is mapped before `finish`, and all
@@ -34,26 +32,25 @@ namespace efm {
 /// stream: the options are chosen from the data so far, and then the depth limits follow the
 /// keyframes.
 ///
-/// Use: add data, and after each call `next` until it returns std::nullopt. At the end call
-/// `finish`, and `next` again.
+/// Use: add the cameras, then data, and after each call `next` until it returns std::nullopt. At
+/// the end call `finish`, and `next` again.
 class MappingSession {
  public:
   explicit MappingSession(const EventFusionOptions& options);
 
-  /// Adds a packet. Nothing is mapped before the rig is complete: see RigAssembly::isReady. In live
-  /// operation it is complete before its events fill half of the queue.
-  /// @throws std::invalid_argument if the packet contradicts its sensor or earlier packets; if its
-  /// camera first appears in a complete rig, or waits for a camera of a lower index for more than a
-  /// second of events; if the options name a camera that the rig does not have.
+  /// Adds all cameras, before the first events.
+  /// @param rig must be valid for `requireMappable`.
+  void addCameras(const Rig& rig);
+  /// Adds a packet.
+  /// @throws std::invalid_argument if the packet is older than earlier packets of its camera.
   void addEvents(EventPacket packet);
   /// Adds a pose. Poses of one source are used: see PoseSourceSelector. The session waits for a
-  /// better source until the rig is complete.
+  /// better source until a packet begins over a second after the first one; in live operation not
+  /// longer than the events fill half of the queue.
   void addPose(const PoseSample& sample);
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
   /// Ends the input.
-  /// @throws std::invalid_argument if a camera has events, but a camera of a lower index has none.
-  /// The other cameras are mapped all the same.
   void finish();
 
   /// Receives a keyframe at its pose by the tracker, and its points in the cloud: the points of its
@@ -123,8 +120,8 @@ class MappingSession {
     return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
   }
   std::size_t heldEvents() const { return mapper_.heldEvents() + guard_.heldEvents(); }
+  bool hasCameras() const { return !mapper_.rig().cameras.empty(); }
   void feed(EventPacket packet);
-  void completeRig();
   void usePose(const NoisyPose& pose);
   void useWaiting(const std::vector<NoisyPose>& poses);
   void useSelected();
@@ -163,7 +160,6 @@ class MappingSession {
 
   AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
   EventFusionOptions options_;  // `automatic`: the options that are still to be chosen
-  RigAssembly rig_;
   PoseSourceSelector pose_source_;
   LiveGuard guard_;
   FusionMapper mapper_;

@@ -18,7 +18,7 @@ class MotionChecks {
         depth_m_(2 / (1 / findings.near_depth_m + 1 / findings.far_depth_m)),
         max_gap_s_(findings.max_pose_gap_s),
         warnings_(warnings) {
-    for (const auto& [key, camera] : recording_.cameras()) {
+    for (const auto& [index, camera] : recording_.cameras()) {
       if (isCalibrated(camera.camera.model))
         focal_px_ = std::max(focal_px_, camera.camera.model.fx);
     }
@@ -54,7 +54,7 @@ class MotionChecks {
     const PoseSpan part = withEvents(span);
     if (part.t1_ns <= part.t0_ns) return 0;
     double count = 0;
-    for (const auto& [key, camera] : recording_.cameras()) {
+    for (const auto& [index, camera] : recording_.cameras()) {
       count += camera.rate.countIn(part.t0_ns, part.t1_ns);
     }
     return count / secondsBetween(part.t0_ns, part.t1_ns);

@@ -9,10 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/sample.h"
 
 namespace efm {
+
+/// Longest wait for a better source, from the begin of the first packet of events on.
+inline constexpr std::int64_t kMaxSourceWaitNs = kNanosecondsPerSecond;
 
 /// Selects the poses of one source and counts the poses of other sources. The poses of two sources
 /// are never mixed: they refer to different worlds, or one source is worse.

@@ -86,8 +86,6 @@ StatisticsOptions statisticsOptions(const EventFusionOptions& options) {
   StatisticsOptions statistics;
   const FusionMapperOptions& mapper = options.mapper;
   statistics.cameras = mapper.cameras;
-  statistics.time_offsets_ns = options.rig.time_offsets_ns;
-  statistics.T_body_rig = readRigSetup(options.rig).T_body_rig;
   statistics.pose_source = options.rig.pose_source;
   if (mapper.only_window) {
     statistics.window_s = secondsBetween(mapper.only_window->t0_ns, mapper.only_window->t1_ns);
@@ -155,25 +153,26 @@ bool RecordingStatistics::add(const Sample& sample) {
   return true;
 }
 
-void RecordingStatistics::addEvents(const EventPacket& packet) {
-  const int index = packet.camera;
-  const RigCamera& camera = packet.calibration;
-  const auto& selected = options_.cameras;
-  if (!selected.empty() && std::count(selected.begin(), selected.end(), index) == 0) return;
-  const auto [entry, is_new] = cameras_.try_emplace({index, packet.label});
-  CameraStatistics& statistics = entry->second;
-  const auto width = static_cast<std::size_t>(camera.model.width);
-  if (is_new) {
-    statistics.camera = camera;
-    const auto offset = static_cast<std::size_t>(index);
-    if (offset < options_.time_offsets_ns.size()) {
-      statistics.camera.time_offset_ns = options_.time_offsets_ns[offset];
-    }
-    // A sensor without a calibration may have the largest possible size.
-    constexpr std::size_t kMaxPixels = 1U << 24U;
-    const std::size_t pixels = width * static_cast<std::size_t>(camera.model.height);
+void RecordingStatistics::setCameras(const Rig& rig, const std::vector<RecordedCamera>& recorded) {
+  // A sensor without a calibration may have the largest possible size.
+  constexpr std::size_t kMaxPixels = 1U << 24U;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    if (!isSelected(static_cast<int>(i), options_.cameras)) continue;
+    CameraStatistics& statistics = cameras_[static_cast<int>(i)];
+    if (i < recorded.size()) statistics.label = recorded[i].label;
+    statistics.camera = rig.cameras[i];
+    const CameraModel& model = statistics.camera.model;
+    const std::size_t pixels =
+        static_cast<std::size_t>(model.width) * static_cast<std::size_t>(model.height);
     if (pixels <= kMaxPixels) statistics.pixels.assign(pixels, 0);
   }
+}
+
+void RecordingStatistics::addEvents(const EventPacket& packet) {
+  const auto entry = cameras_.find(packet.camera);
+  if (entry == cameras_.end()) return;  // it takes no part
+  CameraStatistics& statistics = entry->second;
+  const auto width = static_cast<std::size_t>(statistics.camera.model.width);
   const std::int64_t offset_ns = statistics.camera.time_offset_ns;
   std::vector<std::int64_t>& times_ns = statistics.newest_ns;
   times_ns.clear();
@@ -200,10 +199,8 @@ void RecordingStatistics::addPose(const PoseSample& pose) {
   const std::int64_t t_ns = trajectoryTime(pose.t_ns, 0);
   const auto [entry, is_new] = pose_sources_.try_emplace(pose.source);
   if (is_new) entry->second.order = pose_sources_.size();
-  const Rigid3& T_body_rig = options_.T_body_rig ? *options_.T_body_rig : pose.T_body_rig;
-  entry->second.lever_m = std::max(entry->second.lever_m, T_body_rig.translation.norm());
-  entry->second.add({t_ns, rigPose(pose, options_.T_body_rig)},
-                    durationFromSeconds(options_.window_s));
+  entry->second.lever_m = std::max(entry->second.lever_m, pose.T_body_rig.translation.norm());
+  entry->second.add({t_ns, pose.T_world_rig()}, durationFromSeconds(options_.window_s));
   countAroundPose(t_ns);
 }
 
@@ -214,19 +211,12 @@ void RecordingStatistics::countAroundPose(std::int64_t t_ns) {
   poses_.add(t_ns, t_ns, 1);
   const bool newest = *poses_.last_ns == t_ns;
   if (newest) events_after_poses_ = 0;
-  for (const auto& [key, camera] : cameras_) {
+  for (const auto& [index, camera] : cameras_) {
     if (first) {
       events_before_poses_ +=
           camera.events.count - countBetween(camera.newest_ns, t_ns, kMaxTimeNs);
     }
     if (newest) events_after_poses_ += countBetween(camera.newest_ns, t_ns + 1, kMaxTimeNs);
-  }
-}
-
-void RecordingStatistics::setCameras(const std::vector<RigCamera>& cameras) {
-  for (auto& [key, statistics] : cameras_) {
-    const auto index = static_cast<std::size_t>(key.first);
-    if (index < cameras.size()) statistics.camera = cameras[index];
   }
 }
 
@@ -244,7 +234,7 @@ const PoseStatistics* RecordingStatistics::usedPoses() const {
 
 std::optional<TimeSpan> RecordingStatistics::eventSpan() const {
   std::optional<TimeSpan> span;
-  for (const auto& [key, camera] : cameras_) {
+  for (const auto& [index, camera] : cameras_) {
     if (!camera.events.first_ns) continue;
     extend(span, *camera.events.first_ns);
     extend(span, *camera.events.last_ns);

@@ -58,10 +58,8 @@ std::string sparkline(const std::vector<double>& values);
 
 /// Options for the use of a recording. The default: as recorded.
 struct StatisticsOptions {
-  std::vector<int> cameras;                   ///< The cameras that take part; empty: all.
-  std::vector<std::int64_t> time_offsets_ns;  ///< One per camera, instead of the recording's.
-  std::optional<Rigid3> T_body_rig;           ///< Used instead of the recording's, if set.
-  std::string pose_source;                    ///< Label of the source; empty: the best source.
+  std::vector<int> cameras;  ///< The cameras that take part; empty: all.
+  std::string pose_source;   ///< Label of the source; empty: the best source.
   /// Motion is measured within windows of this length.
   double window_s = 1.0;
 };
@@ -85,6 +83,7 @@ struct StreamStatistics {
 
 /// Statistics of the events of one camera.
 struct CameraStatistics {
+  std::string label;
   RigCamera camera;
   StreamStatistics events;
   std::uint64_t positive = 0;  ///< Events of positive polarity.
@@ -119,20 +118,19 @@ struct PoseStatistics {
 /// grow with the recording. Not thread-safe.
 class RecordingStatistics {
  public:
-  /// Cameras by index and label.
-  using Cameras = std::map<std::pair<int, std::string>, CameraStatistics>;
+  using Cameras = std::map<int, CameraStatistics>;  ///< The cameras that take part, by index.
 
   explicit RecordingStatistics(StatisticsOptions options = {}) : options_(std::move(options)) {}
 
   /// Sets the length of the windows in which motion is measured. Call it before the first pose.
   void setWindow(double window_s) { options_.window_s = window_s; }
+  /// Sets the cameras, before the first events. @param recorded may be empty: without labels.
+  void setCameras(const Rig& rig, const std::vector<RecordedCamera>& recorded);
   /// @return false if the sample is neither events nor a pose.
   bool add(const Sample& sample);
   /// @param packet must have its events in time order.
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);
-  /// Sets the calibrations that a map used instead of the recorded ones.
-  void setCameras(const std::vector<RigCamera>& cameras);
 
   const Cameras& cameras() const { return cameras_; }
   const std::map<PoseSourceId, PoseStatistics>& poseSources() const { return pose_sources_; }

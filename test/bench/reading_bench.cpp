@@ -120,7 +120,7 @@ void writeRawlog(const fs::path& file, const fs::path& folder) {
   RecordingSource source;
   source.files = {folder};
   const std::unique_ptr<Recording> recording = openRecording(source);
-  const auto writer = mrptLibrary("rawlog").writeRawlog(file, RawlogCompression::kGzip);
+  const auto writer = mrptLibrary("rawlog").writeRawlog(file, RawlogCompression::kGzip, *recording);
   while (const auto sample = recording->next()) writer->write(*sample);
   writer->close();
 }

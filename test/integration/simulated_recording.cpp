@@ -60,7 +60,7 @@ std::vector<KeyframeDepthMap> SimulatedRecording::map(const FusionMapperOptions&
   for (const RigCamera& camera : simulation_.rig.cameras) mapper.addCamera(camera);
   for (const StampedPose& pose : poses_) mapper.addPose(pose);
   for (std::size_t c = 0; c < events_.size(); ++c) {
-    mapper.addEvents(static_cast<int>(c), events_[c]);
+    mapper.addEvents(static_cast<int>(c), CheckedEvents(events_[c]));
   }
   mapper.finish();
   std::vector<KeyframeDepthMap> keyframes;

@@ -53,6 +53,7 @@ forbid plugin "$ceres" "refinement is reached through maps/"
 forbid plugin "$recordings" "HDF5 stays in plugin/recordings/columns/ and writers/" '^plugin/recordings/(columns|writers)/'
 
 forbid include "$mrpt|$ceres|$recordings|$front|pcl/|tbb|nlohmann|fmt/" "the public header: Eigen, OpenCV, PCL by map_point.h"
+forbid plugin/recordings "maps/" "knows no map: a library of its own, over mapping/ and tracking_stub/"
 forbid plugin "$mrpt" "MRPT stays in mrpt/" '^plugin/mrpt/'
 forbid python "(test|plugin/app|plugin/mrpt)/" "a thin face: the engine alone"
 forbid python "$mrpt|$pcl|$ceres|$recordings|$front|nlohmann|tbb" "may use pybind11 and what the engine's headers use"

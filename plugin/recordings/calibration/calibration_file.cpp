@@ -16,9 +16,9 @@
 #include <system_error>
 #include <utility>
 
+#include "mapping/base/npy_header.h"
 #include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"
-#include "maps/io/npy_header.h"
 #include "plugin/recordings/calibration/calibration_formats.h"
 #include "plugin/recordings/calibration/yaml_entry.h"
 #include "plugin/recordings/files/file_content.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "maps/io/npy_header.h"
+#include "mapping/base/npy_header.h"
 #include "plugin/recordings/columns/event_table.h"
 #include "plugin/recordings/files/file_content.h"
 

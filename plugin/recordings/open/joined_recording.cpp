@@ -89,6 +89,17 @@ class JoinedRecording : public Recording {
   }
 
   const Rig& rig() const override { return parts_.rig; }
+  std::vector<RecordedCamera> cameras() const override {
+    std::vector<RecordedCamera> cameras;
+    for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {
+      const EventStream& stream = parts_.cameras[i].stream();
+      RecordedCamera& camera = cameras.emplace_back();
+      camera.label = stream.label().empty() ? "cam" + std::to_string(i) : stream.label();
+      camera.original = stream.original();
+      if (i < first_ns_.size()) camera.first_ns = first_ns_[i];
+    }
+    return cameras;
+  }
   std::string position() const override { return position_; }
 
   double progress() const override {
@@ -104,6 +115,7 @@ class JoinedRecording : public Recording {
     counts.warnings = parts_.warnings;
     counts.notes = parts_.notes;
     counts.recalibrated = parts_.recalibrated;
+    counts.of_calibration = parts_.of_calibration;
     counts.topics = parts_.topics;
     counts.transforms = parts_.transforms;
     counts.skipped_events = bad_->count();
@@ -151,7 +163,7 @@ class JoinedRecording : public Recording {
 
   /// Returns whether there is no next packet, or it does not begin before this time.
   bool isDue(std::int64_t t_ns) const {
-    return !packet_ || nearestTick(t_ns) <= nearestTick(*packet_->t_ns);
+    return !packet_ || nearestTick(t_ns) <= nearestTick(packet_->events.front().t_ns);
   }
 
   /// Reads the next packet and object. After damage of the events, only poses come.
@@ -184,25 +196,22 @@ class JoinedRecording : public Recording {
       damaged_ = next;
       return std::nullopt;
     }
-    packet_position_ = parts_.cameras[*next].stream().name();
-    const bool announces = announced_ < parts_.cameras.size();
-    const std::size_t camera = announces ? announced_++ : *next;
-    EventPackets& stream = parts_.cameras[camera];
-    EventPacket packet{static_cast<int>(camera), parts_.rig.cameras[camera], {}};
-    packet.checked = true;
-    packet.t_ns = parts_.cameras[*next].nextTime();
-    packet.label = stream.stream().label();
-    if (packet.label.empty()) packet.label = "cam" + std::to_string(camera);
-    packet.original = stream.stream().original();
-    if (!announces) packet.events = stream.nextPacket();
-    if (nextCamera()) packet.covered_until_ns = stream.nextTime().value_or(kEndOfTimeNs);
+    if (first_ns_.empty()) {
+      for (EventPackets& camera : parts_.cameras) {
+        first_ns_.push_back(camera.nextTime().value_or(kEndOfTimeNs));
+      }
+    }
+    EventPackets& stream = parts_.cameras[*next];
+    packet_position_ = stream.stream().name();
+    EventPacket packet{static_cast<int>(*next), stream.nextPacket()};
+    if (nextCamera()) packet.complete_until_ns = stream.nextTime().value_or(kEndOfTimeNs);
     return packet;
   }
 
   JoinedParts parts_;
   TimeLimits limits_;
-  std::unique_ptr<BadEvents> bad_;  // the cameras refer to it
-  std::size_t announced_ = 0;       // number of empty packets so far
+  std::unique_ptr<BadEvents> bad_;      // the cameras refer to it
+  std::vector<std::int64_t> first_ns_;  // of each camera, known with the first packet
   std::size_t next_pose_ = 0;
   std::optional<EventPacket> packet_;   // the next packet
   std::optional<OtherSample> other_;    // the next object

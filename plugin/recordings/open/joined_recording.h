@@ -15,9 +15,10 @@ namespace efm {
 
 /// The parts that `join` puts together.
 struct JoinedParts {
-  Rig rig;                            ///< Rig that the packets have.
+  Rig rig;                            ///< The cameras of the packets.
   std::vector<EventPackets> cameras;  ///< One per camera of the rig.
   bool recalibrated = false;          ///< See `RecordingCounts`.
+  std::vector<int> of_calibration;    ///< As `recalibrated`.
   std::vector<PoseSample> poses;      ///< The poses in any order; equal times keep theirs.
   std::string poses_damage;  ///< The error that ended the poses: thrown at the recording's end.
   std::unique_ptr<OtherStream> others;  ///< Other objects; may be null.
@@ -36,11 +37,10 @@ struct JoinedParts {
 /// events and poses inside, and the nearest pose of each source before and after, so that events
 /// have poses on both sides. Most events outside are not read if their format has an index.
 ///
-/// The first packets are empty, one per camera. Each further packet has the events of one camera in
-/// a period. After a packet, its camera is complete until the camera's next event. After the
-/// camera's last packet, it is complete for ever (`kEndOfTimeNs`), so nobody waits for a silent
-/// camera. The last packet of the recording has no such time. If a stream has a wrong event, all
-/// samples before the event come before the error.
+/// Each packet has the events of one camera in a period. After a packet, its camera is complete
+/// until the camera's next event. After the camera's last packet, it is complete for ever
+/// (`kEndOfTimeNs`), so nobody waits for a silent camera. The last packet of the recording has no
+/// such time. If a stream has a wrong event, all samples before the event come before the error.
 /// @throws std::runtime_error if there are cameras and no limits, and no camera has an event.
 std::unique_ptr<Recording> join(JoinedParts parts, const TimeLimits& limits);
 

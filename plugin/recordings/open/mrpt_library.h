@@ -31,7 +31,8 @@ struct MrptLibrary {
   /// @param compression gzip for the whole file, MRPT's default; or Zstandard for the events only,
   /// three times as fast, in an uncompressed file.
   std::unique_ptr<RawlogWriter> (*writeRawlog)(const std::filesystem::path& file,
-                                               RawlogCompression compression);
+                                               RawlogCompression compression,
+                                               const Recording& recording);
   void (*writeSimpleMap)(const std::filesystem::path& file,
                          const std::vector<StoredKeyframe>& keyframes);
   /// See `recordFrames` (plugin/mrpt/window/map_scene.h).

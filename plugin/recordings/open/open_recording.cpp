@@ -258,7 +258,7 @@ void requireOneTrajectoryEach(const RecordingParts& parts, const RecordingSource
   requireOneTrajectory(parts.poses, name);
   std::map<PoseSourceId, std::vector<StampedPose>> by_source;
   for (const PoseSample& pose : parts.pose_samples) {
-    by_source[pose.source].push_back({pose.t_ns, rigPose(pose, std::nullopt)});
+    by_source[pose.source].push_back({pose.t_ns, pose.T_world_rig()});
   }
   for (const auto& [id, poses] : by_source) requireOneTrajectory(poses, name + ": " + asText(id));
 }
@@ -325,16 +325,17 @@ bool areNear(const RigCamera& own, const RigCamera& given) {
 /// Returns the rig: by the given calibration, else the recording's own, with the given time
 /// offsets.
 /// @param recalibrated receives whether the given calibration replaces another one.
-Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given,
+Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const RigSetup& setup,
           bool& recalibrated) {
   const std::size_t count = parts.cameras.size();
+  const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
   if (own != nullptr) own->requireCameras(count);
   if (own == nullptr && given == nullptr && source.complete) {
     throw std::runtime_error(fmt::format("{}: no calibration: expected {}, or --calibration FILE",
                                          sourceNames(source.files), parts.expected_calibration));
   }
-  Rig recorded, rig;
+  Rig recorded;
   for (std::size_t camera = 0; camera < count; ++camera) {
     const std::optional<CameraSize> size = sizeOf(parts, camera, given, source);
     RigCamera& of_rig = recorded.cameras.emplace_back();
@@ -346,17 +347,9 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
       of_rig = given->camera(camera, size);
     }
   }
-  if (given != nullptr) given->requireLike(recorded);
-  const std::vector<std::int64_t>& offsets_ns = source.time_offsets_ns;
-  requireOption(offsets_ns.empty() || offsets_ns.size() == count,
-                OptionName("rig", "time_offsets_s", " (how many)"), offsets_ns.size(),
-                fmt::format("one per camera of the recording: {}", count));
-  for (std::size_t camera = 0; camera < count; ++camera) {
-    RigCamera& of_rig = rig.cameras.emplace_back(recorded.cameras[camera]);
-    if (given != nullptr) of_rig = given->camera(camera, knownSize(of_rig.model));
-    recalibrated = recalibrated || (own != nullptr && !areNear(recorded.cameras[camera], of_rig));
-    of_rig.T_rig_cam = roundedPose(of_rig.T_rig_cam);
-    if (!offsets_ns.empty()) of_rig.time_offset_ns = offsets_ns[camera];
+  Rig rig = calibrated(recorded, setup, source.time_offsets_ns);
+  for (std::size_t camera = 0; camera < count && own != nullptr; ++camera) {
+    recalibrated = recalibrated || !areNear(recorded.cameras[camera], rig.cameras[camera]);
   }
   return rig;
 }
@@ -421,9 +414,7 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, const RecordingSource& so
     samples = withFaults(std::move(samples), source.faults, setup.T_body_rig, rig);
   }
   if (setup.T_body_rig) {
-    for (PoseSample& sample : samples) {
-      if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = *setup.T_body_rig;
-    }
+    for (PoseSample& sample : samples) sample.T_body_rig = *setup.T_body_rig;
   }
   return samples;
 }
@@ -437,12 +428,10 @@ void requireCameras(const Calibration& given, const RecordingParts& parts) {
   }
 }
 
-/// @param given words for how the file was given; empty: as the value of `option`.
-void requireGivenFile(const Path& file, const char* option, const std::string& given) {
+void requireGivenFile(const Path& file, const char* option) {
   if (std::filesystem::exists(file)) return requireNoPipe(file);
-  if (file.empty()) return;
-  throw std::runtime_error(
-      fmt::format("{}: no such file", given.empty() ? option + (" " + file.string()) : given));
+  if (!file.empty())
+    throw std::runtime_error(fmt::format("{} {}: no such file", option, file.string()));
 }
 
 }  // namespace
@@ -455,14 +444,14 @@ std::vector<std::string> recordingFormats() {
 
 RigSetup readRigSetup(const RecordingSource& source) {
   if (source.setup) return *source.setup;
-  requireGivenFile(source.calibration, "--calibration", source.calibration_given);
-  requireGivenFile(source.hand_eye, "--hand-eye", source.hand_eye_given);
+  requireGivenFile(source.calibration, "--calibration");
+  requireGivenFile(source.hand_eye, "--hand-eye");
   return readRigSetup(source.calibration, source.hand_eye);
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   requireUnits(source.reader);
-  requireGivenFile(source.poses, "--poses", {});
+  requireGivenFile(source.poses, "--poses");
   RigSetup setup = readRigSetup(source);
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
   const bool has_hand_eye = setup.T_body_rig.has_value();
@@ -477,8 +466,11 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
   }
 
+  JoinedParts joined;
   if (setup.calibration) {
+    const std::size_t all = setup.calibration->rig.cameras.size();
     setup.calibration = setup.calibration->of(parts.cameras.size(), source.cameras);
+    if (setup.calibration->rig.cameras.size() < all) joined.of_calibration = source.cameras;
   }
   const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
   if (given != nullptr && !parts.one_camera.empty()) requireCameras(*given, parts);
@@ -486,8 +478,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
       parts.calibration->rig.cameras.size() != parts.cameras.size()) {
     parts.calibration.reset();
   }
-  JoinedParts joined;
-  if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, given, joined.recalibrated);
+  if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, setup, joined.recalibrated);
   for (std::size_t i = 0; i < parts.cameras.size(); ++i) {
     const CameraModel& model = joined.rig.cameras[i].model;
     joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},

@@ -23,9 +23,6 @@ struct RecordingSource {
   std::filesystem::path poses;               ///< See `readPoses`. Empty: the recording's.
   std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
   std::filesystem::path hand_eye;            ///< See `readHandEye`. Empty: the recording's.
-  /// How the files were given, for errors. Empty: by --calibration and --hand-eye.
-  std::string calibration_given;
-  std::string hand_eye_given;
   /// Calibration and hand-eye transform, if they were read already.
   std::shared_ptr<const RigSetup> setup = nullptr;
   /// The cameras of the given calibration that the recording has, if it has fewer. Empty: all.

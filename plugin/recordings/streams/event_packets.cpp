@@ -44,7 +44,7 @@ void EventPackets::startAt(std::int64_t t_ns) {
   stream_->seek(t_ns - kMaxEventDelayNs);
 }
 
-std::vector<Event> EventPackets::nextPacket() {
+CheckedEvents EventPackets::nextPacket() {
   readAhead();
   if (first_ == events_.size()) return {};
   const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
@@ -53,7 +53,7 @@ std::vector<Event> EventPackets::nextPacket() {
       begin, begin + static_cast<std::ptrdiff_t>(most),
       [end_ns = periodEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
   first_ = static_cast<std::size_t>(end - events_.begin());
-  return {begin, end};
+  return CheckedEvents({begin, end});
 }
 
 std::optional<std::int64_t> EventPackets::nextTime() {

@@ -49,7 +49,7 @@ class EventPackets {
   /// Returns the events of the next period that has events, in time order. Events of equal time
   /// keep the order of the file. More than `kMaxPacketEvents` events become several packets, even
   /// if all have the same time. The packet is empty at the end.
-  std::vector<Event> nextPacket();
+  CheckedEvents nextPacket();
   /// Returns the first time of the next packet; std::nullopt at the end. At damage, the time of the
   /// newest event.
   std::optional<std::int64_t> nextTime();

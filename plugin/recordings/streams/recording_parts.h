@@ -171,6 +171,10 @@ struct RigSetup {
 RigSetup readRigSetup(const std::filesystem::path& calibration,
                       const std::filesystem::path& hand_eye);
 
+/// Returns a rig with the given calibration and time offsets (one per camera, or none) instead of
+/// its own, and with `roundedPose`.
+Rig calibrated(Rig rig, const RigSetup& setup, const std::vector<std::int64_t>& time_offsets_ns);
+
 /// Choices that a reader cannot find in the file.
 struct ReaderOptions {
   /// Topics of bags, or names of streams, to read: events (one per camera, in the order of the

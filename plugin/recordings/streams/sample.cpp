@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/streams/sample.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/recording_parts.h"
@@ -72,8 +75,21 @@ RigSetup readRigSetup(const std::filesystem::path& calibration,
   return setup;
 }
 
-Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig) {
-  return roundedPose(pose.T_world_body * T_body_rig.value_or(pose.T_body_rig));
+Rig calibrated(Rig rig, const RigSetup& setup, const std::vector<std::int64_t>& time_offsets_ns) {
+  const std::size_t count = rig.cameras.size();
+  if (setup.calibration) setup.calibration->requireLike(rig);
+  requireOption(time_offsets_ns.empty() || time_offsets_ns.size() == count,
+                OptionName("rig", "time_offsets_s", " (how many)"), time_offsets_ns.size(),
+                fmt::format("one per camera of the recording: {}", count));
+  for (std::size_t i = 0; i < count; ++i) {
+    RigCamera& camera = rig.cameras[i];
+    if (setup.calibration) camera = setup.calibration->camera(i, knownSize(camera.model));
+    camera.T_rig_cam = roundedPose(camera.T_rig_cam);
+    if (!time_offsets_ns.empty()) camera.time_offset_ns = time_offsets_ns[i];
+  }
+  return rig;
 }
+
+Rigid3 PoseSample::T_world_rig() const { return roundedPose(T_world_body * T_body_rig); }
 
 }  // namespace efm

@@ -44,25 +44,23 @@ std::string asText(const PoseSourceId& source);
 
 /// Events of one camera in an interval of time.
 struct EventPacket {
-  int camera = 0;         ///< Index in the rig.
-  RigCamera calibration;  ///< Equal in all packets of a camera; the options may replace it.
-  std::vector<Event> events;
+  int camera = 0;  ///< Index in the rig.
+  CheckedEvents events;
   /// The camera's events before this time (its own clock) are complete: in this packet or in
   /// earlier packets. So an empty packet with this time says that there was no event.
-  std::optional<std::int64_t> covered_until_ns = std::nullopt;
-  std::optional<std::int64_t> t_ns =
-      std::nullopt;  ///< Time of the first event; an empty packet has a time of its own.
-  /// True if EventPackets has checked the events: they lie inside the sensor, in the order of time.
-  bool checked = false;
-  std::string label = {};  ///< Name of the sensor; empty: not known.
-  /// End of the events that the host left out, on the camera's clock. Such a packet has no events.
-  std::optional<std::int64_t> skipped_until_ns = std::nullopt;
-  /// The camera's first packet in the rawlog (a CObservationEvents); null for other formats.
-  std::shared_ptr<const void> original = nullptr;
-  int num_cameras = 0;  ///< Number of cameras of the rig; 0: the sender does not know it.
+  std::optional<std::int64_t> complete_until_ns = std::nullopt;
 };
 
-/// A pose of a tracker: T_world_rig = T_world_body * T_body_rig.
+/// What a recording tells of a camera beside its calibration.
+struct RecordedCamera {
+  std::string label;  ///< Name of the sensor.
+  /// Time of the first event; kEndOfTimeNs if there is none. Known with the first packet.
+  std::int64_t first_ns = kEndOfTimeNs;
+  /// The camera's first packet in the rawlog (a CObservationEvents); null for other formats.
+  std::shared_ptr<const void> original = nullptr;
+};
+
+/// A pose of a tracker.
 struct PoseSample {
   PoseSourceId source;
   std::int64_t t_ns = 0;
@@ -72,6 +70,9 @@ struct PoseSample {
   std::optional<PoseNoise> noise = std::nullopt;
   std::shared_ptr<const void> original =
       nullptr;  ///< The observation in the rawlog; null: not kept.
+
+  /// Returns the pose of the rig, see `roundedPose`.
+  Rigid3 T_world_rig() const;
 };
 
 /// Any other content of a rawlog.
@@ -80,9 +81,6 @@ struct OtherSample {
   std::optional<std::int64_t> t_ns;  ///< std::nullopt if the observation has no time.
   std::shared_ptr<const void> original;
 };
-
-/// Returns T_world_rig, see `roundedPose`. @param T_body_rig replaces the recording's, if set.
-Rigid3 rigPose(const PoseSample& pose, const std::optional<Rigid3>& T_body_rig);
 
 /// Returns the time of an event on the clock of the poses. The arguments may be unchecked: they are
 /// limited to kEndOfTimeNs, so that their sum and differences of results do not overflow.
@@ -134,6 +132,8 @@ struct RecordingCounts {
   std::vector<Warning> warnings;     ///< Warnings of the readers: see `EventStream::warnings`.
   std::vector<Warning> notes;        ///< Notes of the readers, for example of replaced transforms.
   bool recalibrated = false;  ///< A given calibration replaced another one, the recording's own.
+  /// The cameras of a given calibration that the recording has, if the calibration has more.
+  std::vector<int> of_calibration;
   std::vector<RecordedTopic> topics;          ///< Topics of a bag, if they were asked for.
   std::vector<RecordedTransform> transforms;  ///< As `topics`.
   /// Times of the events nearest to the time limits of reading, on the clock of the poses.
@@ -141,7 +141,7 @@ struct RecordingCounts {
 };
 
 /// Recording as a stream of samples in the order of time. A pose comes before the packets that
-/// begin at its time or later. The first packets are empty, one per camera: they announce the rig.
+/// begin at its time or later.
 class Recording {
  public:
   virtual ~Recording() = default;
@@ -160,8 +160,10 @@ class Recording {
   /// Returns the damage that ended the recording; empty if there is none.
   virtual std::string damage() const { return {}; }
 
-  /// Returns the cameras, as in the packets.
+  /// Returns the cameras of the packets, with given files and offsets applied. It never changes.
   virtual const Rig& rig() const = 0;
+  /// Returns one for each camera of the rig.
+  virtual std::vector<RecordedCamera> cameras() const = 0;
 
   /// Returns the position of the last sample that `next` returned: "cam0/events.txt".
   virtual std::string position() const = 0;

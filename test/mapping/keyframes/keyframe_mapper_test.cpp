@@ -240,14 +240,6 @@ TEST(KeyframeMapper, WhatIsNotValidIsNamed) {
   expectError(broken, {0}, 1, "fx = 0");  // the reference camera is checked even if not selected
   expectError(broken, {0, 1}, 0, "fx = 0");
   EXPECT_NO_THROW(KeyframeMapper(broken, {0, 2}, fewPlanes()));
-
-  // This event is outside the sensor of a selected camera.
-  recording.events[1][50].x = 48;
-  KeyframeMapper mapper(recording.rig, {0, 1}, fewPlanes());
-  EXPECT_THAT([&] { mapper.map(Recording::kWindow, recording.spans(), recording.trajectory); },
-              ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("camera 1"), HasSubstr("48x36"), HasSubstr("(48, "))));
-  map(recording, {0, 2}, fewPlanes());
 }
 
 }  // namespace

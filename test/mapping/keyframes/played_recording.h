@@ -116,8 +116,9 @@ inline Played play(const LongRecording& recording, const FusionMapperOptions& op
     const std::size_t end = std::min(sizeOf(stream), done[stream] + size);
     if (stream < cameras) {
       const auto begin = recording.events[stream].begin();
-      mapper.addEvents(static_cast<int>(stream), {begin + static_cast<std::ptrdiff_t>(done[stream]),
-                                                  begin + static_cast<std::ptrdiff_t>(end)});
+      mapper.addEvents(static_cast<int>(stream),
+                       CheckedEvents({begin + static_cast<std::ptrdiff_t>(done[stream]),
+                                      begin + static_cast<std::ptrdiff_t>(end)}));
     } else {
       for (std::size_t i = done[stream]; i < end; ++i) mapper.addPose(recording.poses[i]);
     }

@@ -346,7 +346,7 @@ TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
   for (int packet = 0; packet < 500; ++packet) {  // 5 s of 10 events per millisecond
     const std::int64_t t_ns = LongRecording::kStart_ns + packet * 10 * kMs;
     mapper.addPose({t_ns, {}});
-    mapper.addEvents(0, random.events(test::smallCamera(), 100, t_ns, 10 * kMs));
+    mapper.addEvents(0, CheckedEvents(random.events(test::smallCamera(), 100, t_ns, 10 * kMs)));
     EXPECT_FALSE(mapper.next());
     const EventCounts counts = mapper.counts().total();
     // Kept events: the longest window, a stride, the allowed delay of events and the last packet.
@@ -358,7 +358,7 @@ TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
   for (int packet = 500; packet < 540; ++packet) {
     const std::int64_t t_ns = LongRecording::kStart_ns + packet * 10 * kMs;
     mapper.addPose({t_ns, {Eigen::Quaterniond::Identity(), {0.01 * (packet - 500), 0, 0}}});
-    mapper.addEvents(0, random.events(test::smallCamera(), 100, t_ns, 10 * kMs));
+    mapper.addEvents(0, CheckedEvents(random.events(test::smallCamera(), 100, t_ns, 10 * kMs)));
     while (auto keyframe = mapper.next()) keyframes.push_back(std::move(*keyframe));
   }
   ASSERT_FALSE(keyframes.empty());

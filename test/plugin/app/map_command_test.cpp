@@ -162,7 +162,7 @@ TEST_F(MapCommand, MapRecordingMakesTheSameFilesAndReportsTheSameErrors) {
   for (const std::string& text :
        {messageOf([&] { openRecording({folder() / "data"}, missing); }),
         messageOf([&] { mapRecording({folder() / "data"}, folder() / "x", {}, missing); })}) {
-    EXPECT_EQ(text, "calibration none.yaml: no such file");
+    EXPECT_EQ(text, "Overrides::calibration none.yaml: no such file");
   }
 
   // Damage: what comes before it is mapped, then the error is thrown.

@@ -124,7 +124,7 @@ TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
     play(builder, observations);
     mrpt::maps::CSimpleMap initial;
     builder.getCurrentlyBuiltMap(initial);
-    Mapper mapper(options, {}, keyframesOf(initial));
+    MapperOfRig mapper(options, {}, keyframesOf(initial));
     play(mapper, samples);
 
     builder.initialize(initial);
@@ -259,7 +259,7 @@ TEST(CEventFusionMapBuilder, AHostMayDropItsLastReferenceInACallback) {
     dropped.set_value();
   });
   auto is_dropped = dropped.get_future();
-  for (const auto& observation : observationsOf(announced(SyntheticRecording()))) {
+  for (const auto& observation : declaredObservationsOf(samplesOf(SyntheticRecording()))) {
     builder->processObservation(observation);
   }
   EXPECT_NEAR(estimateOf(*builder).mean.x(), 0.4, 1e-9) << "the pose does not wait";
@@ -296,7 +296,7 @@ TEST_P(BuilderInEitherMode, ABadObservationInAFrameTakesNoOtherWithIt) {
   for (const auto& observation : observationsOf(recording)) {
     const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
     mrpt::obs::CSensoryFrame frame;
-    frame.insert(observationOf(EventPacket{0, recording.cameras[0], {{t_ns, 120, 0, true}}, t_ns}));
+    frame.insert(observationOf(EventPacket{0, CheckedEvents({{t_ns, 120, 0, true}}), t_ns}));
     frame.insert(observation);
     try {
       builder.processActionObservation(action, frame);

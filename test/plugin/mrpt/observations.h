@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,16 +38,18 @@ std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
   return std::dynamic_pointer_cast<Object>(archive.ReadObject());
 }
 
-/// Returns a packet of events as in a rawlog.
+/// Returns a packet of events as in a rawlog, of a camera of the synthetic rig.
 inline CObservationEvents::Ptr observationOf(const EventPacket& packet) {
+  static const std::vector<RigCamera> rig = SyntheticRecording(0.001, 3).cameras;
+  const RigCamera& camera = rig.at(static_cast<std::size_t>(packet.camera));
   auto observation = CObservationEvents::Create();
   observation->sensorLabel = "cam" + std::to_string(packet.camera);
-  observation->timestamp = mrptTimeFrom(packet.covered_until_ns.value_or(0));
+  observation->timestamp = mrptTimeFrom(packet.complete_until_ns.value_or(0));
   observation->camera_index = packet.camera;
-  observation->camera = packet.calibration.model;
-  observation->camera_pose = mrptPoseFrom(packet.calibration.T_rig_cam);
-  observation->events = packet.events;
-  observation->covered_until_ns = packet.covered_until_ns;
+  observation->camera = camera.model;
+  observation->camera_pose = mrptPoseFrom(camera.T_rig_cam);
+  observation->events = packet.events.all();
+  observation->covered_until_ns = packet.complete_until_ns;
   return observation;
 }
 
@@ -72,6 +75,25 @@ inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(const Samples& s
     }
   }
   return observations;
+}
+/// Returns the same, with the declaration of the rig at the beginning: see CObservationEvents.
+inline std::vector<mrpt::obs::CObservation::Ptr> declaredObservationsOf(const Samples& samples) {
+  std::vector<mrpt::obs::CObservation::Ptr> declarations, others;
+  std::set<int> begun;
+  for (const auto& observation : observationsOf(samples)) {
+    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    const bool waits = packet && begun.count(packet->camera_index) == 0;
+    if (waits && packet->events.empty()) continue;
+    others.push_back(observation);
+    if (!waits) continue;
+    begun.insert(packet->camera_index);
+    const auto empty = std::make_shared<CObservationEvents>(*packet);
+    empty->events.clear();
+    empty->covered_until_ns = packet->events.front().t_ns;
+    declarations.push_back(empty);
+  }
+  declarations.insert(declarations.end(), others.begin(), others.end());
+  return declarations;
 }
 inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
     const SyntheticRecording& recording) {

@@ -283,7 +283,7 @@ TEST(TrackerPoses, TheNewestIsThatOfTheSelectedSourceOrOfPosesInTheWorld) {
   const auto add = [&](const mrpt::obs::CObservation::Ptr& observation, std::int64_t t_ns) {
     PoseSample observed = poseIn(observation);
     observed.t_ns = t_ns;
-    poses.add(*observation, observed, observed.T_world_body);
+    poses.add(*observation, observed);
   };
   const auto x_of = [&](const std::optional<PoseSourceId>& selected) {
     const auto* newest = poses.newest(selected);

@@ -400,7 +400,8 @@ TEST(ConfigFolder, EveryFileIsRead) {
     OptionReader reader;
     EXPECT_NO_THROW(reader.readFile(entry.path())) << entry.path();
     EXPECT_NO_THROW(reader.options()) << entry.path();
-    EXPECT_NO_THROW(readRigSetup(reader.options().rig)) << entry.path();
+    EXPECT_NO_THROW(readRigSetup(reader.options().rig.calibration, reader.options().rig.hand_eye))
+        << entry.path();
     ++files;
   }
   EXPECT_GE(files, 6);

@@ -97,12 +97,14 @@ TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
 }
 
 /// @param t_ns time of the last event; the first event is earlier.
-EventPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
-  RigCamera calibration;
-  calibration.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
+std::vector<Event> eventsUntil(std::int64_t t_ns, std::size_t count) {
   std::vector<Event> events(count, Event{t_ns, 0, 0, true});
   if (count > 1) events.front().t_ns -= 3;
-  return {camera, calibration, events, std::nullopt};
+  return events;
+}
+
+EventPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
+  return {camera, CheckedEvents(eventsUntil(t_ns, count))};
 }
 
 RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, ()) {
@@ -112,7 +114,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   const std::size_t fit = *rc::gen::inRange<std::size_t>(1, 10);
   const std::size_t events_that_fit = *rc::gen::inRange<std::size_t>(0, 100);
   options.max_queue_mb =
-      1e-6 * static_cast<double>(fit * sizeof(EventPacket) + events_that_fit * sizeof(Event));
+      1e-6 * static_cast<double>(fit * sizeof(QueuedPacket) + events_that_fit * sizeof(Event));
   InputQueue queue(options);
   struct Waiting {
     int camera;
@@ -131,7 +133,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   };
   const auto events_of = [](const Waiting& one) { return one.events; };
   const auto bytes_of = [](const Waiting& one) {
-    return sizeof(EventPacket) + one.events * sizeof(Event);
+    return sizeof(QueuedPacket) + one.events * sizeof(Event);
   };
   const auto miss = [&](const Waiting& one) {
     if (one.events == 0 && !one.skipped) return;
@@ -147,7 +149,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     counts.received += kind == kTake ? 0 : one.events;
     if (kind != kTake) {
       if (kind == kPause) {
-        queue.skip(packet(camera, one.t_ns, one.events));
+        queue.skip(camera, eventsUntil(one.t_ns, one.events));
         counts.fates[EventFate::kPaused] += one.events;
         if (one.events > 0) waiting.push_back({one.camera, 0, one.t_ns, true});
       } else {
@@ -167,7 +169,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
       const InputQueue::Batch batch = queue.take(all_mapped);
       RC_ASSERT(batch.poses.size() == std::exchange(poses, 0));
       bool may_skip = all_mapped;  // skipped packets come first and end the batch
-      for (const EventPacket& taken : batch.packets) {
+      for (const QueuedPacket& taken : batch.packets) {
         const Waiting next = waiting.front();
         waiting.pop_front();
         RC_ASSERT(may_skip || !next.skipped);
@@ -206,11 +208,11 @@ RC_GTEST_PROP(InputQueue, RejectsAloneWhatIsFarAheadOfItsStream, ()) {
   const auto steps = *rc::gen::container<std::vector<std::tuple<std::int64_t, bool, bool>>>(
       rc::gen::tuple(rc::gen::element<std::int64_t>(1, 3'000'000'000), rc::gen::arbitrary<bool>(),
                      rc::gen::arbitrary<bool>()));
-  EventPacket next = packet(0, 0, 0);
+  std::vector<Event> next;
   std::vector<std::int64_t> expected{0};
   std::uint64_t wrong = 0;
   const auto add = [&](std::int64_t t_ns) {
-    next.events.push_back({t_ns, 0, 0, true});
+    next.push_back({t_ns, 0, 0, true});
     queue.add(PoseSample{{}, t_ns, {}, {}});
   };
   add(0);
@@ -220,21 +222,21 @@ RC_GTEST_PROP(InputQueue, RejectsAloneWhatIsFarAheadOfItsStream, ()) {
     if (ahead) add(expected.back() + 100'000'000'000);
     wrong += ahead ? 1 : 0;
     if (!ends_packet) continue;
-    next.covered_until_ns = next.events.back().t_ns;  // may be far ahead, too
-    queue.add(std::exchange(next, packet(0, 0, 0)));
+    const std::int64_t until_ns = next.back().t_ns;  // may be far ahead, too
+    queue.add({0, CheckedEvents(std::exchange(next, {})), until_ns});
   }
   for (int i = 0; i < 2; ++i) {  // so the last times are confirmed, too
     expected.push_back(expected.back() + 1);
     add(expected.back());
   }
-  queue.add(next);
+  queue.add({0, CheckedEvents(next)});
   queue.end();
   const InputQueue::Batch batch = queue.take();
   std::vector<std::int64_t> events_ns;
   std::vector<std::int64_t> poses_ns;
   for (const EventPacket& one : batch.packets) {
     for (const Event& event : one.events) events_ns.push_back(event.t_ns);
-    RC_ASSERT(one.covered_until_ns.value_or(0) <= expected.back());
+    RC_ASSERT(one.complete_until_ns.value_or(0) <= expected.back());
   }
   for (const PoseSample& pose : batch.poses) poses_ns.push_back(pose.t_ns);
   RC_ASSERT(events_ns == expected);
@@ -259,7 +261,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_EQ(queue.counts().at(0).fates[EventFate::kSubsampled], 20U);
   EXPECT_EQ(queue.counts().at(0).fates[EventFate::kAfterEnd], 30U);
   EXPECT_EQ(queue.counts().at(0).queued, 0U);
-  queue.skip(packet(0, 7, 5));
+  queue.skip(0, eventsUntil(7, 5));
   EXPECT_EQ(queue.counts().at(0).fates[EventFate::kPaused], 5U);
   EXPECT_EQ(queue.counts().at(0).received, 65U);
   EXPECT_TRUE(queue.take().missing.empty()) << "after the end";

@@ -120,21 +120,21 @@ TEST(LiveGuard, DropsTheWindowsThatNeedMissingEventsInBothModes) {
 }
 
 TEST(LiveGuard, LateEventsAreTakenOutAndAnOlderPacketIsReported) {
-  const SyntheticRecording recording(1);
+  SyntheticRecording recording(1);
+  recording.cameras[0].time_offset_ns = 7 * kMillisecond;
   const std::int64_t now_ns = recording.poses.back().t_ns;
   for (const bool live : {false, true}) {
     LiveGuard guard = live ? liveGuard() : LiveGuard(LiveOptions{});
     FusionMapper mapper = mapperOf(recording);
-    mapper.addEvents(0, {{now_ns, 1, 1, true}});
+    mapper.addEvents(0, CheckedEvents({{now_ns, 1, 1, true}}));
     EventPacket mixed{
-        0, recording.cameras[0], {{now_ns - 40 * kMillisecond, 1, 1, true}, {now_ns, 1, 1, true}}};
+        0, CheckedEvents({{now_ns - 40 * kMillisecond, 1, 1, true}, {now_ns, 1, 1, true}})};
     EXPECT_FALSE(guard.admit(mapper, mixed));
     EXPECT_EQ(mixed.events.size(), live ? 1U : 2U);
     EXPECT_EQ(mapper.counts().late_events, live ? 1U : 0U);
-    EventPacket older{0, recording.cameras[0], {{now_ns - 5000 * kMillisecond, 1, 1, true}}};
-    older.calibration.time_offset_ns = 7;
+    EventPacket older{0, CheckedEvents({{now_ns - 5007 * kMillisecond, 1, 1, true}})};
     const auto begin_ns = guard.admit(mapper, older);
-    EXPECT_EQ(begin_ns, live ? std::optional(now_ns - 5000 * kMillisecond + 7) : std::nullopt);
+    EXPECT_EQ(begin_ns, live ? std::optional(now_ns - 5000 * kMillisecond) : std::nullopt);
   }
 }
 

@@ -20,14 +20,14 @@ using testing::HasSubstr;
 
 TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) {
   const Samples samples = samplesOf(shaken(SyntheticRecording(1.3)));
-  Mapper playback(syntheticOptions());
+  MapperOfRig playback(syntheticOptions());
   play(playback, samples);
   EventFusionOptions options = live();
   options.live.max_keyframes = 4;
   std::vector<std::size_t> sizes;
   Mapper::Callbacks callbacks;
   callbacks.on_map = [&](const auto& map) { sizes.push_back(map->trajectory.size()); };
-  Mapper mapper(options, callbacks);
+  MapperOfRig mapper(options, callbacks);
   addPatiently(mapper, samples);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (mapper.snapshot()->trajectory.size() < 11 && std::chrono::steady_clock::now() < end) {
@@ -60,7 +60,7 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
 
 /// The mapper is stopped, or destroyed, while its thread maps and callbacks use it.
 TEST(LiveMapper, StopWaitsForTheCallbackAndFinishReturnsAfterIt) {
-  const Samples samples = announced(SyntheticRecording(1.5));
+  const Samples samples = samplesOf(SyntheticRecording(1.5));
   for (const bool finishes : {false, true}) {
     std::promise<void> within;
     std::atomic<bool> ends{false};
@@ -77,7 +77,7 @@ TEST(LiveMapper, StopWaitsForTheCallbackAndFinishReturnsAfterIt) {
       }
       ++calls;
     };
-    mapper = std::make_unique<Mapper>(live(), callbacks);
+    mapper = std::make_unique<MapperOfRig>(live(), callbacks);
     user = mapper.get();
     for (const Sample& sample : samples) mapper->add(sample);
     within.get_future().wait();
@@ -106,14 +106,14 @@ TEST(LiveMapper, AHostMayDropItsLastReferenceInEachCallback) {
   };
   SyntheticRecording recording;
   recording.events[1].resize(1);  // the log warns about the silent camera
-  const Samples samples = announced(recording);
+  const Samples samples = samplesOf(recording);
   for (const std::string name : {"keyframe", "map", "log"}) {
     const auto host = std::make_shared<Host>();
     Mapper::Callbacks callbacks;
     if (name == "keyframe") callbacks.on_keyframe = [host](const auto&) { host->drop(); };
     if (name == "map") callbacks.on_map = [host](const auto&) { host->drop(); };
     if (name == "log") callbacks.warn = [host](const auto&) { host->drop(); };
-    host->mapper = std::make_shared<Mapper>(live(), callbacks);
+    host->mapper = std::make_shared<MapperOfRig>(live(), callbacks);
     const std::weak_ptr<Mapper> mapper = host->mapper;
     for (const Sample& sample : samples) host->mapper->add(sample);
     host->fed.set_value();
@@ -138,7 +138,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
     if (!is_stopped.exchange(true)) go_on.get_future().wait();
   };
-  Mapper mapper(options, callbacks);
+  MapperOfRig mapper(options, callbacks);
   std::size_t i = 0;
   for (; i < samples.size() && !is_stopped; ++i) {
     mapper.add(samples[i]);
@@ -173,7 +173,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
                        recording.poses.front().T_world_rig};
   };
   for (const std::int64_t newest_s : {590, 610}) {
-    MappingSession session(live());
+    SessionOfRig session(live());
     addPoses(session, recording);
     session.addPose(sampleOf(at(newest_s + 2)));
     EXPECT_FALSE(session.next());
@@ -183,7 +183,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
     EXPECT_EQ(counts[EventFate::kDropped] == counts.read, newest_s > 600);
   }
   const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
-  MappingSession session(live());
+  SessionOfRig session(live());
   for (std::int64_t ago_s = 7200; ago_s > 0; --ago_s) {
     session.addPose(sampleOf(at(ago_s == 5000 ? 4980 : -ago_s), wheels));
     EXPECT_FALSE(session.next());
@@ -197,12 +197,12 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
 
 TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
   const SyntheticRecording recording(3);
-  for (const bool is_announced : {true, false}) {
+  {
     EventFusionOptions options = live();
     options.automatic = defaultOptions().automatic;
     options.live.max_queue_events = 1000;
-    Mapper mapper(options);
-    play(mapper, is_announced ? announced(recording) : samplesOf(recording));
+    MapperOfRig mapper(options);
+    play(mapper, samplesOf(recording));
 
     const SessionStatus status = mapper.status();
     expectSumsAgree(status);
@@ -223,18 +223,18 @@ TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
     EXPECT_GT(mapper.points()->size(), 30U);
     EXPECT_GT(static_cast<double>(mapper.snapshot()->trajectory.size()), 2.7 / window->value);
     EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
-    EXPECT_EQ(status.live->dropRatio(), 0) << "whether the rig is known at once or not";
+    EXPECT_EQ(status.live->dropRatio(), 0);
   }
 }
 
 TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnError) {
-  Samples samples = announced(SyntheticRecording(3));
+  Samples samples = samplesOf(SyntheticRecording(3));
   for (std::size_t i = samples.size() / 2; i < samples.size(); ++i) {
     auto* const packet = std::get_if<EventPacket>(&samples[i]);
     if (packet == nullptr) continue;
     std::vector<Event> events;
     for (const Event& event : packet->events) events.insert(events.end(), 4, event);
-    packet->events = events;
+    packet->events = CheckedEvents(std::move(events));
   }
   for (const bool is_chosen : {true, false}) {
     EventFusionOptions options = live();
@@ -243,7 +243,7 @@ TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnEr
     options.live.max_event_rate = 0;
     options.live.max_queue_events = 2000;
     MapperLog log;
-    Mapper mapper(options, log.callbacks());
+    MapperOfRig mapper(options, log.callbacks());
     play(mapper, samples);
 
     const SessionStatus status = mapper.status();
@@ -271,11 +271,11 @@ TEST(LiveMapper, LossesAreLoggedWithNumbersAndLatePosesAreCounted) {
   EventFusionOptions options = live();
   options.live.max_event_rate = 1000;  // 10 events in 10 ms
   MapperLog log;
-  Mapper mapper(options, log.callbacks());
-  EventPacket packet{1, recording.cameras[1], {}, std::nullopt};
-  for (int i = 0; i < 33; ++i) packet.events.push_back({i, 1, 1, true});
-  packet.events.push_back({20 * kMsNs, 1, 1, true});
-  addPatiently(mapper, {EventPacket{0, recording.cameras[0], {}, std::nullopt}, packet});
+  MapperOfRig mapper(options, log.callbacks());
+  std::vector<Event> events;
+  for (int i = 0; i < 33; ++i) events.push_back({i, 1, 1, true});
+  events.push_back({20 * kMsNs, 1, 1, true});
+  addPatiently(mapper, {EventPacket{0, {}}, EventPacket{1, CheckedEvents(std::move(events))}});
   mapper.finish();
   ASSERT_FALSE(log.lines.empty());
   EXPECT_EQ(log.lines[0],
@@ -283,7 +283,7 @@ TEST(LiveMapper, LossesAreLoggedWithNumbersAndLatePosesAreCounted) {
             "afterwards, of 0 events; camera 1: 0 dropped, 23 subsampled, 0 rejected, 0 lost "
             "afterwards, of 34 events");
 
-  Mapper other(live());
+  MapperOfRig other(live());
   addPatiently(other, samplesOf(recording));
   other.add(sampleOf({SyntheticRecording::kStartNs - 9000 * kMsNs, {}}, {PoseKind::kPose, "pose"}));
   other.finish();
@@ -293,13 +293,13 @@ TEST(LiveMapper, LossesAreLoggedWithNumbersAndLatePosesAreCounted) {
 }
 
 TEST(LiveMapper, EventsThatWaitForPosesAreBoundedInNumberAndMemory) {
-  const Samples samples = announced(SyntheticRecording(1.5));
+  const Samples samples = samplesOf(SyntheticRecording(1.5));
   for (const bool by_memory : {false, true}) {
     EventFusionOptions options = live();
     options.live.max_pose_wait_s = 3600;
     (by_memory ? options.live.max_queue_mb : options.live.max_event_rate) = by_memory ? 0.016 : 0;
     if (!by_memory) options.live.max_queue_events = 1000;
-    Mapper mapper(options);
+    MapperOfRig mapper(options);
     std::uint64_t most = 0;
     for (const Sample& sample : samples) {
       const auto* const pose = std::get_if<PoseSample>(&sample);
@@ -321,7 +321,7 @@ TEST(LiveMapper, EventsThatWaitForPosesAreBoundedInNumberAndMemory) {
 /// Each sample may be late, wrong or lost, with any schedule of the mapper's thread.
 RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
   static const Samples samples = samplesOf(SyntheticRecording(0.7));
-  enum { kLate = 1, kOutside, kOtherLens, kOlder, kPaused, kLost, kJump, kTwice, kAhead, kKinds };
+  enum { kLate = 1, kOutside, kOlder, kPaused, kLost, kJump, kTwice, kAhead, kKinds };
   const auto faults = *rc::gen::container<std::vector<int>>(
       7, rc::gen::weightedOneOf<int>({{3, rc::gen::just(0)}, {1, rc::gen::inRange(1, +kKinds)}}));
   EventFusionOptions options = live();
@@ -332,7 +332,7 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
   options.live.max_queue_mb = *rc::gen::element(0.02, 256.0);
   options.live.max_pose_wait_s = 0.2;
   options.automatic.window_s = options.automatic.stride_s = *rc::gen::arbitrary<bool>();
-  Mapper mapper(options);
+  MapperOfRig mapper(options);
   std::map<int, std::uint64_t> fed;
   double away_m = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -340,25 +340,29 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
     away_m += fault == kJump ? 10 : 0;
     Sample sample = samples[i];
     auto* const packet = std::get_if<EventPacket>(&sample);
+    std::vector<Event> events;
+    std::optional<std::int64_t> until_ns;
     if (packet == nullptr) {
       std::get<PoseSample>(sample).T_world_body.translation.y() += away_m;
     } else {
-      const std::int64_t t_ns = *packet->covered_until_ns;
-      if (fault == kLate) packet->events.push_back({t_ns - 30 * kMsNs, 3, 3, true});
-      if (fault == kOutside) packet->events.push_back({t_ns, 120, 3, true});
-      if (fault == kAhead) packet->events.push_back({t_ns + 3600 * 1000 * kMsNs, 3, 3, true});
-      if (fault == kOtherLens) packet->calibration.model.fx = 99;
-      if (fault == kOlder) {
-        packet->covered_until_ns.reset();
-        for (Event& event : packet->events) event.t_ns -= 5000 * kMsNs;
-      }
+      const std::int64_t t_ns = *packet->complete_until_ns;
+      events = packet->events.all();
+      if (fault == kLate) events.push_back({t_ns - 30 * kMsNs, 3, 3, true});
+      if (fault == kOutside) events.push_back({t_ns, 120, 3, true});
+      if (fault == kAhead) events.push_back({t_ns + 3600 * 1000 * kMsNs, 3, 3, true});
+      if (fault != kOlder) until_ns = t_ns;
+      for (Event& event : events) event.t_ns -= fault == kOlder ? 5000 * kMsNs : 0;
     }
     for (int times = fault == kTwice ? 2 : fault == kLost ? 0 : 1; times > 0; --times) {
-      if (packet != nullptr) fed[packet->camera] += packet->events.size();
-      if (packet != nullptr && fault == kPaused) {
-        mapper.core().skip(*packet);
-      } else {
+      if (packet == nullptr) {
         messageOf([&] { mapper.add(sample); });
+        continue;
+      }
+      fed[packet->camera] += events.size();
+      if (fault == kPaused) {
+        mapper.core().skip(packet->camera, events);
+      } else {
+        messageOf([&] { mapper.core().addEvents(packet->camera, events, until_ns); });
       }
     }
   }

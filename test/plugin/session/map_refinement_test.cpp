@@ -22,7 +22,7 @@ namespace {
 std::vector<KeyframeDepthMap> shakenKeyframes(double duration_s = 1.2) {
   EventFusionOptions options = refinedOptions();
   options.refinement.enabled = false;
-  MappingSession session(options);
+  SessionOfRig session(options);
   return mapAll(session, shaken(SyntheticRecording(duration_s)));
 }
 
@@ -292,9 +292,9 @@ INSTANTIATE_TEST_SUITE_P(Background, RefinedSession, testing::Bool());
 
 TEST_P(RefinedSession, BringsKeyframesNearerToTheTruth) {
   const SyntheticRecording recording(2.0);
-  MappingSession truth(unrefinedOptions());
+  SessionOfRig truth(unrefinedOptions());
   mapAll(truth, recording);
-  MappingSession session(optionsOf(GetParam()));
+  SessionOfRig session(optionsOf(GetParam()));
   mapAll(session, shaken(recording));
 
   const double tracker_m = distanceOf(session.T_odom_ref(), truth.T_world_ref());
@@ -314,10 +314,10 @@ TEST_P(RefinedSession, BringsKeyframesNearerToTheTruth) {
 TEST(Session, MakesTheSameMapFromPacketsOfAnyLength) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   for (const bool refined : {false, true}) {
-    MappingSession at_once(refined ? optionsOf(false) : unrefinedOptions());
+    SessionOfRig at_once(refined ? optionsOf(false) : unrefinedOptions());
     mapAll(at_once, recording);
     for (const int packet_ms : {10, 70, 400}) {
-      MappingSession piecewise(refined ? optionsOf(packet_ms == 70) : unrefinedOptions());
+      SessionOfRig piecewise(refined ? optionsOf(packet_ms == 70) : unrefinedOptions());
       mapPiecewise(piecewise, recording, packet_ms);
       expectSameMap(piecewise, at_once);
     }
@@ -341,7 +341,7 @@ std::unique_ptr<MappingSession> mapWith(
     const EventFusionOptions& options,
     const std::function<void(MappingSession&, const StampedPose&, std::size_t)>& add) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
-  auto session = std::make_unique<MappingSession>(options);
+  auto session = std::make_unique<SessionOfRig>(options);
   for (std::size_t i = 0; i < recording.poses.size(); ++i) add(*session, recording.poses[i], i);
   addEvents(*session, recording);
   mapRest(*session);
@@ -379,7 +379,7 @@ TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRejectsDoesNotShiftTheO
   SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   EventFusionOptions options = optionsOf(GetParam());
   options.mapper.trajectory.max_pose_gap_s = 0.02;
-  MappingSession session(options);
+  SessionOfRig session(options);
   for (StampedPose pose : recording.poses) {
     const std::int64_t window = (pose.t_ns - SyntheticRecording::kStartNs) / kShakenWindowNs;
     if (window == 5) pose.T_world_rig.translation.z() += 1e18;  // here, voxels have no numbers

@@ -24,27 +24,33 @@ using Samples = std::vector<Sample>;
 
 inline constexpr std::int64_t kMsNs = 1'000'000;
 
+/// A mapper of the synthetic rig.
+struct MapperOfRig : Mapper {
+  explicit MapperOfRig(const Options& options = {}, Callbacks callbacks = {},
+                       const std::vector<StoredKeyframe>& earlier = {})
+      : Mapper(options, std::move(callbacks), earlier) {
+    addCameras({SyntheticRecording(0.001).cameras});
+  }
+};
+
 /// Returns packets of 10 ms of each camera, then the pose at their end.
-/// @param announced the first packets announce the cameras: the empty packets before a camera's
-/// first event are complete until this event.
-inline Samples samplesOf(const SyntheticRecording& recording, bool announced = false) {
+inline Samples samplesOf(const SyntheticRecording& recording) {
   Samples samples;
   std::vector<std::size_t> begin(recording.cameras.size(), 0);
   for (const StampedPose& pose : recording.poses) {
     for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
-      EventPacket packet{static_cast<int>(c), recording.cameras[c], {}, pose.t_ns};
+      std::vector<Event> part;
       const std::vector<Event>& events = recording.events[c];
       for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
-        packet.events.push_back(events[begin[c]]);
+        part.push_back(events[begin[c]]);
       }
-      if (announced && begin[c] == 0) packet.covered_until_ns = events.at(0).t_ns;
-      samples.emplace_back(std::move(packet));
+      samples.emplace_back(
+          EventPacket{static_cast<int>(c), CheckedEvents(std::move(part)), pose.t_ns});
     }
     samples.emplace_back(sampleOf(pose, {PoseKind::kPose, "pose"}));
   }
   return samples;
 }
-inline Samples announced(const SyntheticRecording& recording) { return samplesOf(recording, true); }
 
 inline std::size_t numEvents(const Sample& sample) {
   const auto* const packet = std::get_if<EventPacket>(&sample);
@@ -77,7 +83,7 @@ inline void play(Mapper& mapper, const Samples& samples) {
 
 inline std::shared_ptr<const MapSnapshot> mapOf(const EventFusionOptions& options,
                                                 const Samples& samples) {
-  Mapper mapper(options);
+  MapperOfRig mapper(options);
   play(mapper, samples);
   return mapper.snapshot();
 }

@@ -45,7 +45,7 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
     options.mapper.fill_last_window =
         true;  // has no effect in live operation; else the last window moves back from the end
     options.live.enabled = live;
-    MappingSession session(options);
+    SessionOfRig session(options);
     EXPECT_EQ(mapAll(session, recording).size(), live ? 3U : 4U);
     ASSERT_GT(session.cloud().points()->size(), 30U);
     // In a window, dots have 8 px of parallax and are rounded to pixels. An error of half a pixel
@@ -68,6 +68,7 @@ EventFusionOptions automaticOptions() {
 
 RecordingSurvey surveyOf(const SyntheticRecording& recording, const EventFusionOptions& options) {
   FirstLook surveyor(options);
+  surveyor.take(Rig{recording.cameras});
   for (const StampedPose& pose : recording.poses) surveyor.addPose(sampleOf(pose));
   for (double begin_s = 0; begin_s < 5; begin_s += 0.1) {
     for (const int c : {0, 1}) surveyor.addEvents(pieceOf(recording, c, begin_s, begin_s + 0.1));
@@ -85,14 +86,13 @@ TEST(FirstLook, TakesTheSameEventsFromPacketsOfAnyLength) {
   std::vector<std::vector<WindowSample>> looks;
   for (const std::size_t length : {std::size_t{9001}, std::size_t{123'457}, events.size()}) {
     FirstLook look(automaticOptions());
+    look.take(Rig{recording.cameras});
     for (const StampedPose& pose : recording.poses) look.addPose(sampleOf(pose));
     for (const int c : {0, 1}) {
       for (std::size_t first = 0; first < events.size(); first += length) {
-        EventPacket packet{c, packetOf(recording, c).calibration, {}};
-        packet.events.assign(
-            events.begin() + std::ptrdiff_t(first),
-            events.begin() + std::ptrdiff_t(std::min(first + length, events.size())));
-        look.addEvents(packet);
+        const auto begin = events.begin() + std::ptrdiff_t(first);
+        const std::size_t part = std::min(length, events.size() - first);
+        look.addEvents({c, CheckedEvents({begin, begin + std::ptrdiff_t(part)})});
       }
     }
     looks.push_back(look.finish().samples);
@@ -111,9 +111,9 @@ TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
                                               survey.duration_s, options.mapper);
     EXPECT_TRUE(choice.found_scene);
     options.automatic = {};
-    MappingSession expected(options);
+    SessionOfRig expected(options);
     mapAll(expected, recording);
-    MappingSession session(automaticOptions());
+    SessionOfRig session(automaticOptions());
 
     EXPECT_THAT(mapUnfinished(session, recording, 10), IsEmpty()) << "more may come";
     EXPECT_THAT(mapRest(session), Not(IsEmpty()));
@@ -131,13 +131,13 @@ TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
 
 TEST(MappingSession, AnAutomaticVoxelIsAPixelAtTheMedianDepthAndIsChosenOnce) {
   const SyntheticRecording recording(4.2);
-  const double pixel_m = SyntheticRecording::kDepthM / packetOf(recording, 0).calibration.model.fx;
+  const double pixel_m = SyntheticRecording::kDepthM / recording.cameras[0].model.fx;
   for (const bool live : {false, true}) {
     for (const bool has_earlier : {false, true}) {
       EventFusionOptions options = automaticOptions();
       options.automatic.voxel_size_m = true;
       options.live.enabled = live;
-      MappingSession session(options);
+      SessionOfRig session(options);
       if (has_earlier) session.insertEarlier({{{0, 0, 1}, 1.0F}}, {});
       EXPECT_THAT(mapAll(session, recording), Not(IsEmpty()));
       const double voxel_m = session.cloudOptions().voxel_size_m;
@@ -171,7 +171,7 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
   for (const bool is_full : {true, false}) {
     EventFusionOptions options = automaticOptions();
     if (is_full) options.live.max_queue_mb = kMaxMb;
-    MappingSession session(options);
+    SessionOfRig session(options);
     if (!is_full) session.noteMissing(0, {kMinTimeNs, DropReason::kPaused});
     EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
     ASSERT_EQ(session.status().chosen.size(), 5U);
@@ -179,8 +179,7 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
       const std::size_t at = option.reason.find("; from the first ");
       ASSERT_NE(at, std::string::npos) << option.reason;
       const double seconds = std::stod(option.reason.substr(at + 17));
-      const double expected =
-          is_full ? secondsBetween(times_ns[0], times_ns[fit]) : 1;  // all cameras are known at 1 s
+      const double expected = is_full ? secondsBetween(times_ns[0], times_ns[fit]) : 1;
       EXPECT_NEAR(seconds, expected, 0.03) << "up to a packet of 10 ms: " << option.reason;
       EXPECT_THAT(option.reason,
                   testing::EndsWith(is_full ? " s of a stream, 0 MB of events ([live] max_queue_mb)"
@@ -223,12 +222,12 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
   for (const bool is_automatic : {false, true}) {
     EventFusionOptions options = is_automatic ? automaticOptions() : syntheticOptions();
     options.live.enabled = true;
-    MappingSession healthy(options);
+    SessionOfRig healthy(options);
     feed(healthy, recording, 0);
     const std::size_t complete = mapDue(healthy).size();
     EXPECT_GT(complete, is_automatic ? 0U : 8U);
 
-    MappingSession session(options);
+    SessionOfRig session(options);
     feed(session, recording, 0);
     feed(session, later, -100);
     EXPECT_EQ(session.status().live->clock_resets, 0U) << "not yet";
@@ -269,7 +268,7 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
     }
     EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
-    MappingSession session(options);
+    SessionOfRig session(options);
 
     std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 10);
     EXPECT_EQ(!keyframes.empty(), row.before_the_end) << row.jumps_s[0];
@@ -298,7 +297,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
     const SyntheticRecording recording(rest_s + 4.3, 1, {kDepthM, kSpeedMS, rest_s, 1});
     EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
-    MappingSession session(options);
+    SessionOfRig session(options, 1);
 
     const std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 50);
 
@@ -319,186 +318,6 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
     EXPECT_EQ(status.choices, rest_s < 10 ? 1U : 2U) << "the first time without a scene";
     EXPECT_FALSE(status.scene_unknown) << rest_s;
     EXPECT_THAT(status.chosen.at(0).reason, HasSubstr("; from 1 s at ")) << rest_s;
-  }
-}
-
-TEST(MappingSession, WhatDoesNotFitTheRigIsAnErrorThatNamesIt) {
-  const SyntheticRecording recording(1.2);
-  struct Row {
-    const char* error;
-    std::function<void(MappingSession&)> feed;
-  };
-  const auto with = [&](const std::function<void(EventPacket&)>& change) {
-    return [&recording, change](MappingSession& session) {
-      session.addEvents(packetOf(recording, 0));
-      EventPacket packet = packetOf(recording, 1);
-      change(packet);
-      session.addEvents(packet);
-    };
-  };
-  const Row rows[] = {
-      {"the recording has events of camera 1 but none of camera 0",
-       [&](MappingSession& session) {
-         session.addEvents(packetOf(recording, 1));
-         session.finish();
-       }},
-      {"camera 1 first appears when the rig is complete: all cameras must be there within a second "
-       "of the first event, in live operation also before the queue is half full",
-       [&](MappingSession& session) {
-         for (const auto& [begin_s, end_s] : {std::pair{0.0, 1.1}, std::pair{1.1, 1.2}}) {
-           session.addEvents(pieceOf(recording, 0, begin_s, end_s));
-         }
-         session.addEvents(packetOf(recording, 1));
-       }},
-      {"camera -1: must be 0 or above", with([](auto& packet) { packet.camera = -1; })},
-      {"camera 1 has no calibration: a map needs --calibration FILE ([rig] calibration)",
-       with([](auto& packet) { packet.calibration.model.fy = 0; })},
-      {"camera 0: its calibration or its pose on the rig differs from that of its first packet",
-       with([](auto& packet) { packet.camera = 0; })},
-  };
-  for (const Row& row : rows) {
-    MappingSession session(syntheticOptions());
-    EXPECT_EQ(messageOf([&] { row.feed(session); }), row.error);
-  }
-}
-
-TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
-  const SyntheticRecording recording(1.5, 3);
-  for (const bool zero_is_there : {false, true}) {
-    MappingSession session(syntheticOptions());
-    std::uint64_t fed = 0;
-    std::uint64_t rejected = 0;
-    std::int64_t since_ns = 0;
-    for (int i = 0; i < 150; ++i) {
-      if (zero_is_there) session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
-      EventPacket packet = pieceOf(recording, 2, 0.01 * i, 0.01 * (i + 1));
-      if (packet.events.empty()) continue;
-      if (since_ns == 0) since_ns = packet.events[0].t_ns;
-      const bool is_late = packet.events[0].t_ns - since_ns > 1'000'000'000;
-      EXPECT_EQ(messageOf([&] { session.addEvents(packet); }),
-                !is_late        ? "no error"
-                : zero_is_there ? "the recording has events of camera 2 but none of camera 1"
-                                : "the recording has events of camera 2 but none of camera 0");
-      fed += packet.events.size();
-      if (is_late) rejected += packet.events.size();
-    }
-    EXPECT_GT(rejected, 200U);
-    EXPECT_EQ(session.status().rejected_events.at(2), rejected);
-    EXPECT_THROW(session.finish(), std::invalid_argument);
-    EXPECT_EQ(session.status().rejected_events.at(2), fed) << "all";
-  }
-}
-
-TEST(MappingSession, ARejectedPacketTakesNoOtherWithIt) {
-  const SyntheticRecording recording;
-  EventFusionOptions options = syntheticOptions();
-  options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
-  MappingSession session(options);
-  EventPacket outside = pieceOf(recording, 1, 0, 0.1);
-  outside.events.front().t_ns =
-      SyntheticRecording::kStartNs - 1000;  // before the limits: not counted, either
-  outside.events.back().x = 120;
-  const EventPacket good = pieceOf(recording, 1, 0.1, 0.5);
-  session.addEvents(outside);
-  session.addEvents(good);
-  EXPECT_FALSE(session.status().events) << "they wait for camera 0";
-  EXPECT_THAT(messageOf([&] { session.addEvents(packetOf(recording, 0)); }),
-              HasSubstr("pixel (120"));
-  const SessionStatus status = session.status();
-  EXPECT_EQ(status.counts.cameras.at(0).read, recording.events[0].size());
-  EXPECT_EQ(status.counts.cameras.at(1).read, good.events.size());
-  EXPECT_EQ(status.rejected_events.at(1), outside.events.size());
-  EXPECT_EQ(status.events->first_ns, recording.events[0].front().t_ns);
-  EXPECT_NO_THROW(session.finish());
-}
-
-TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
-  enum class Start { kAnnounced, kOffsets, kInexact, kNoPoses };
-  for (const int cameras : {1, 2}) {
-    const SyntheticRecording recording(0.5, cameras);
-    MappingSession expected(syntheticOptions());
-    mapPiecewise(expected, recording, 10);
-    for (const Start start :
-         {Start::kAnnounced, Start::kOffsets, Start::kInexact, Start::kNoPoses}) {
-      EventFusionOptions options = syntheticOptions();
-      options.rig.time_offsets_ns.resize(start == Start::kOffsets ? recording.cameras.size() : 0);
-      MappingSession session(options);
-      if (start != Start::kNoPoses) addPoses(session, recording);
-      for (int c = 0; c < cameras; ++c) {
-        const auto index = static_cast<std::size_t>(c);
-        EventPacket empty{c, recording.cameras[index], {}, recording.events[index].front().t_ns};
-        if (start == Start::kOffsets || start == Start::kInexact) --*empty.covered_until_ns;
-        session.addEvents(empty);
-      }
-      std::size_t early = 0;
-      for (int i = 0; i < 50; ++i) {
-        for (int c = 0; c < cameras; ++c) {
-          session.addEvents(pieceOf(recording, c, 0.01 * i, 0.01 * (i + 1)));
-        }
-        early += mapDue(session).size();
-      }
-      EXPECT_EQ(early, start <= Start::kOffsets ? 3U : 0U) << static_cast<int>(start);
-      if (start == Start::kNoPoses) addPoses(session, recording);
-      mapRest(session);
-      expectSameMap(session, expected);
-    }
-  }
-}
-
-// --- The options' calibration ------------------------------------------------------------------
-
-class CalibratedSession : public TemporaryFolder {
- protected:
-  /// Returns options with a calibration of other cameras.
-  EventFusionOptions optionsOf(const std::vector<RigCamera>& cameras) const {
-    EventFusionOptions options = syntheticOptions();
-    options.rig.calibration = folder() / "camchain.yaml";
-    std::ofstream(options.rig.calibration) << formatCamchain({cameras});
-    return options;
-  }
-};
-
-TEST_F(CalibratedSession, UsesTheOptionsCalibration) {
-  const SyntheticRecording recording;
-  std::vector<RigCamera> cameras = recording.cameras;
-  cameras[1].T_rig_cam.translation.y() += 1e-3;
-  MappingSession moved(optionsOf(cameras));
-  mapAll(moved, recording);
-  EXPECT_NEAR(moved.status().rig.cameras[1].T_rig_cam.translation.y(), 1e-3, 1e-12);
-  cameras[0].model.cx += 1;
-  MappingSession both(optionsOf(cameras));
-  mapAll(both, recording);
-  EXPECT_EQ(both.status().rig.cameras[0].model.cx, recording.cameras[0].model.cx + 1);
-}
-
-TEST_F(CalibratedSession, InLiveOperationADeclaredCameraMayBeginAtAnyTime) {
-  const SyntheticRecording recording(1.8);
-  EventFusionOptions options = optionsOf(recording.cameras);
-  options.live.enabled = true;
-  options.rig.time_offsets_ns = {1000, -2000};
-  MappingSession session(options);
-  EXPECT_EQ(session.status().rig.cameras.size(), 2U);
-  addPoses(session, recording);
-  std::size_t early = 0;
-  for (int i = 0; i < 160; ++i) {
-    session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
-    early += mapDue(session).size();
-  }
-  EXPECT_NO_THROW(session.addEvents(pieceOf(recording, 1, 1.6, 1.8)));
-  EXPECT_EQ(session.status().rig.cameras[1].time_offset_ns, -2000);
-  EXPECT_EQ(early, 4U) << "windows of 0.2 s, every 0.1 s, a second after a silent camera";
-
-  options.rig.calibration = folder() / "calib.txt";  // the file has no sensor size
-  options.rig.time_offsets_ns.clear();
-  std::ofstream(options.rig.calibration) << "100 100 59.5 44.5 0 0 0 0 0\n";
-  EXPECT_EQ(MappingSession(options).status().rig.cameras.size(), 0U);
-}
-
-TEST_F(CalibratedSession, AnotherNumberOfCamerasIsAnError) {
-  const SyntheticRecording recording;
-  for (const auto& [count, error] : {std::pair{3, "3 cameras: expected 2"}, {1, "1 camera, but"}}) {
-    MappingSession session(optionsOf(SyntheticRecording(0.1, count).cameras));
-    EXPECT_THAT(messageOf([&] { mapAll(session, recording); }), HasSubstr(error));
   }
 }
 

@@ -39,10 +39,11 @@ std::vector<Warning> warningsOf(const std::vector<StampedPose>& poses,
   RecordingStatistics statistics;
   RigCamera camera;
   camera.model = {120, 90, focal_px, focal_px, 59.5, 44.5, DistortionModel::kNone, {}};
+  statistics.setCameras({{camera}}, {});
   for (const StampedPose& pose : poses) {
     statistics.addPose({{PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {}});
   }
-  statistics.addEvents({0, camera, events});
+  statistics.addEvents({0, CheckedEvents(events)});
   std::vector<Warning> warnings;
   checkMotion({statistics, {}, kMaxTimeNs, depth_m, depth_m}, warnings);
   return warnings;

@@ -16,23 +16,30 @@
 
 namespace efm {
 
+/// A session of the synthetic rig, with the options' time offsets.
+struct SessionOfRig : MappingSession {
+  explicit SessionOfRig(const EventFusionOptions& options, int num_cameras = 2)
+      : MappingSession(options) {
+    addCameras(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
+                          options.rig.time_offsets_ns));
+  }
+};
+
 /// Returns all events of a camera in one packet.
 inline EventPacket packetOf(const SyntheticRecording& recording, int camera) {
-  const auto index = static_cast<std::size_t>(camera);
-  return {camera, recording.cameras[index], recording.events[index], std::nullopt};
+  return {camera, CheckedEvents(recording.events[static_cast<std::size_t>(camera)])};
 }
 
 /// Returns a camera's events in [begin_s, end_s), in seconds since the recording's start.
 inline EventPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
                            double end_s) {
-  EventPacket packet = packetOf(recording, camera);
-  auto& events = packet.events;
+  std::vector<Event> events = recording.events[static_cast<std::size_t>(camera)];
   const auto outside = [&](const Event& event) {
     const double t_s = 1e-9 * static_cast<double>(event.t_ns - SyntheticRecording::kStartNs);
     return t_s < begin_s || t_s >= end_s;
   };
   events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
-  return packet;
+  return {camera, CheckedEvents(std::move(events))};
 }
 
 /// A sink that throws at each plane, so that no keyframe is made.
@@ -91,13 +98,13 @@ inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
     const std::int64_t passed_ms = (until_ns - SyntheticRecording::kStartNs) / 1'000'000;
     if (passed_ms % packet_ms != 0 && !last) continue;
     for (std::size_t c = recording.cameras.size(); c-- > 0;) {
-      EventPacket packet{static_cast<int>(c), recording.cameras[c], {}, std::nullopt};
-      if (!last) packet.covered_until_ns = until_ns;
+      std::vector<Event> part;
       const std::vector<Event>& events = recording.events[c];
       for (; begin[c] < events.size() && (last || events[begin[c]].t_ns < until_ns); ++begin[c]) {
-        packet.events.push_back(events[begin[c]]);
+        part.push_back(events[begin[c]]);
       }
-      session.addEvents(std::move(packet));
+      session.addEvents({static_cast<int>(c), CheckedEvents(std::move(part)),
+                         last ? std::nullopt : std::optional(until_ns)});
     }
     std::vector<KeyframeDepthMap> made = mapDue(session);
     std::move(made.begin(), made.end(), std::back_inserter(keyframes));

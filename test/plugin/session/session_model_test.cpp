@@ -94,7 +94,7 @@ class Model {
 
   void addPose(const StampedPose& pose, bool is_odometry) {
     if (clock_reset_) return later_.push_back([=] { addPose(pose, is_odometry); });
-    if (!rig_complete_ && is_odometry) {
+    if (!source_selected_ && is_odometry) {
       waiting_.push_back(pose);  // waits for a better source
     } else if (!use(pose)) {
       ++status.live->rejected_poses;
@@ -109,11 +109,11 @@ class Model {
     if (clock_reset_) return later_.push_back([=] { addEvents(packet); });
     const int c = packet.camera;
     const std::int64_t offset_ns = offsets_ns_[static_cast<std::size_t>(c)];
-    for (Event& event : packet.events) event.t_ns += offset_ns;
-    if (packet.covered_until_ns) *packet.covered_until_ns += offset_ns;
+    std::vector<Event> events = packet.events.all();
+    for (Event& event : events) event.t_ns += offset_ns;
+    if (packet.complete_until_ns) *packet.complete_until_ns += offset_ns;
     Camera& camera = clock_.cameras[static_cast<std::size_t>(c)];
     EventCounts& counts = status.counts.cameras[static_cast<std::size_t>(c)];
-    const std::vector<Event>& events = packet.events;
     std::int64_t newest_ns = camera.newest_ns.value_or(kMinTimeNs + kTickNs);
     const auto is_late = [&](const Event& event) { return event.t_ns < newest_ns - kTickNs; };
     const auto is_before = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
@@ -132,11 +132,11 @@ class Model {
       in_time.push_back(event.t_ns);
       if (event.t_ns >= clock_.released_ns) camera.held.push_back({event.t_ns, false});
     }
-    if (packet.covered_until_ns) {
-      camera.covered_ns = std::max(camera.covered_ns, *packet.covered_until_ns);
+    if (packet.complete_until_ns) {
+      camera.covered_ns = std::max(camera.covered_ns, *packet.complete_until_ns);
     }
     if (in_time.empty()) {
-      if (packet.covered_until_ns) dropMissing(c, *packet.covered_until_ns);
+      if (packet.complete_until_ns) dropMissing(c, *packet.complete_until_ns);
       return;
     }
     const std::int64_t first_ns = in_time.front();
@@ -152,9 +152,8 @@ class Model {
       if (lacking.until_ns <= clock_.newest_begin_ns) dropMissing(other, kMaxTimeNs);
     }
     clock_.first_ns = std::min(clock_.first_ns, first_ns);
-    const bool known = !clock_.poses_ns.empty() || !clock_.next_segment.empty();
     const bool fills_queue = static_cast<double>(heldEvents()) > queue_events_ / 2;
-    if (known || fills_queue || clock_.newest_begin_ns - clock_.first_ns > kS) completeRig();
+    if (fills_queue || clock_.newest_begin_ns - clock_.first_ns > kS) selectSource();
   }
 
   void noteMissing(int camera, const MissingEvents& missing) {
@@ -167,12 +166,11 @@ class Model {
   void finish() {
     finished_ = true;
     while (!clock_.missing.empty()) dropMissing(clock_.missing.begin()->first, kMaxTimeNs);
-    completeRig();
+    selectSource();
   }
 
   /// Returns the next window that can be mapped. Windows without events are skipped.
   std::optional<Window> nextWindow() {
-    if (!rig_complete_) return std::nullopt;
     do {
       if (const std::optional<Window> window = windowOfStretch()) return window;
     } while (beginStretch() || beginClock());
@@ -180,7 +178,7 @@ class Model {
   }
 
   /// Returns the same window, but does not go on to the poses after a jump.
-  std::optional<Window> oldestWindow() { return rig_complete_ ? windowOfStretch() : std::nullopt; }
+  std::optional<Window> oldestWindow() { return windowOfStretch(); }
 
   enum class Outcome { kMapped, kMappingFails, kStoringFails, kTooMuch };
   /// @return whether a keyframe was computed.
@@ -213,7 +211,6 @@ class Model {
     return mapped;
   }
 
-  bool rigIsComplete() const { return rig_complete_; }
   void dropOlderHalf() {
     std::int64_t oldest_ns = kMaxTimeNs;  // oldest event that no earlier event can follow
     for (const Camera& camera : clock_.cameras) {
@@ -225,8 +222,8 @@ class Model {
     const auto held_ns = static_cast<double>(clock_.reached_ns - oldest_ns);
     const double needed =
         static_cast<double>(heldEvents()) * static_cast<double>(window_ns_) / held_ns;
-    const bool too_large = rig_complete_ && needed > queue_events_ &&
-                           static_cast<double>(heldEvents()) > queue_events_ / 2;
+    const bool too_large =
+        needed > queue_events_ && static_cast<double>(heldEvents()) > queue_events_ / 2;
     dropWindowsBefore((oldest_ns + clock_.reached_ns) / 2 + 1,
                       too_large ? DropReason::kTooLarge : DropReason::kOverload);
   }
@@ -313,8 +310,8 @@ class Model {
   }
   std::int64_t nextStartNs() const { return *clock_.start_ns + clock_.next * stride_ns_; }
 
-  void completeRig() {
-    rig_complete_ = true;
+  void selectSource() {
+    source_selected_ = true;
     useAll(std::exchange(waiting_, {}));
   }
   void useAll(const std::vector<StampedPose>& poses) {
@@ -438,7 +435,6 @@ class Model {
     }
     if (t_ns - older.since_ns < kS) return;
     clock_reset_ = true;
-    if (!rig_complete_) beginClock();
   }
   /// Starts the new clock after the complete windows before it are mapped.
   bool beginClock() {
@@ -458,7 +454,7 @@ class Model {
   double queue_events_;
   std::vector<std::int64_t> offsets_ns_;
   Clock clock_;
-  bool rig_complete_ = false;
+  bool source_selected_ = false;
   bool clock_reset_ = false;
   std::vector<std::function<void()>> later_;
   std::vector<StampedPose> waiting_;
@@ -509,7 +505,9 @@ class Run {
   /// @param predicts if true, the model predicts the windows; otherwise only properties of any
   /// windows are compared.
   Run(const EventFusionOptions& options, const PoseSourceId& source, bool predicts)
-      : options_(options), source_(source), predicts_(predicts) {}
+      : options_(options), source_(source), predicts_(predicts) {
+    queue_.add(session_.status().rig);
+  }
 
   void play(const std::vector<Phase>& phases) {
     runPhase({kHealthy, 0, 5});
@@ -522,7 +520,7 @@ class Run {
     const RefinementState refinement = session_.status().refinement.value_or(RefinementState{});
     RC_ASSERT(refinement.waiting + refinement.failures == 0U);
     queue_.add(sampleOf(recording_.poses[0]));
-    queue_.add(EventPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
+    queue_.add(0, {{0, 1, 1, true}}, {});
     RC_ASSERT(queue_.counts().at(0).fates[EventFate::kAfterEnd] == 1U);
     RC_ASSERT(queue_.rejectedPoses() >= 1U);
   }
@@ -561,37 +559,37 @@ class Run {
 
   void addPacket(int c, int fault, bool last) {
     const auto index = static_cast<std::size_t>(c);
-    EventPacket packet{c, recording_.cameras[index], {}, {}};
+    std::vector<Event> part;
     const std::int64_t until_ns = recording_.poses[tick_].t_ns;
     std::size_t& begin = begin_[index];
     const std::vector<Event>& events = recording_.events[index];
     for (; begin < events.size() && events[begin].t_ns < until_ns; ++begin) {
-      packet.events.push_back(events[begin]);
-      packet.events.back().t_ns += shift_ns_;
+      part.push_back(events[begin]);
+      part.back().t_ns += shift_ns_;
     }
-    packet.covered_until_ns = until_ns + shift_ns_;
+    std::optional<std::int64_t> complete_ns = until_ns + shift_ns_;
     if (fault == kCameraSilent) return;
-    EventPacket& waiting = late_[index];
-    packet.events.insert(packet.events.begin(), waiting.events.begin(), waiting.events.end());
-    waiting.events.clear();
+    std::vector<Event>& waiting = late_[index];
+    part.insert(part.begin(), waiting.begin(), waiting.end());
+    waiting.clear();
     if (fault == kCameraLate && !last) {
-      waiting = packet;
+      waiting = part;
       return;
     }
     if (fault == kCameraClockBack) {
-      packet.covered_until_ns.reset();
-      for (Event& event : packet.events) event.t_ns -= 5 * kS;
+      complete_ns.reset();
+      for (Event& event : part) event.t_ns -= 5 * kS;
     }
     const std::int64_t now_ns = until_ns + shift_ns_;
     const std::int64_t offset_ns = options_.rig.time_offsets_ns[index];
-    if (fault == kLateEvents) packet.events.push_back({now_ns - 40 * kMs, 1, 1, true});
-    if (fault == kBadPackets) packet.events.push_back({now_ns, 120, 1, true});
-    for (Event& event : packet.events) event.t_ns -= offset_ns;
-    if (packet.covered_until_ns) *packet.covered_until_ns -= offset_ns;
-    received_[index] += packet.events.size();
-    if (fault == kPaused) return queue_.skip(packet);
+    if (fault == kLateEvents) part.push_back({now_ns - 40 * kMs, 1, 1, true});
+    if (fault == kBadPackets) part.push_back({now_ns, 120, 1, true});
+    for (Event& event : part) event.t_ns -= offset_ns;
+    if (complete_ns) *complete_ns -= offset_ns;
+    received_[index] += part.size();
+    if (fault == kPaused) return queue_.skip(c, part);
     try {
-      queue_.add(std::move(packet));
+      queue_.add(c, std::move(part), complete_ns);
     } catch (const std::invalid_argument&) {
       RC_ASSERT(fault == kBadPackets);
     }
@@ -637,7 +635,7 @@ class Run {
       session_.noteMissing(camera, missing);
       model_.noteMissing(camera, missing);
     }
-    for (const EventPacket& packet : batch.packets) {
+    for (const QueuedPacket& packet : batch.packets) {
       if (packet.skipped_until_ns) {
         const MissingEvents missing{*packet.skipped_until_ns, DropReason::kPaused};
         session_.noteMissing(packet.camera, missing);
@@ -662,7 +660,6 @@ class Run {
 
   /// Sets the limit of held events to zero: all windows that newer events follow are dropped.
   void limitHeld() {
-    if (predicts_ && !model_.rigIsComplete()) return;
     messageOf([&] { session_.limitHeld(-1); });
     if (!predicts_) return;
     std::optional<Window> oldest = model_.oldestWindow();
@@ -739,11 +736,11 @@ class Run {
   bool predicts_;
   const SyntheticRecording& recording_ = sharedRecording();
   InputQueue queue_{options_.live};
-  MappingSession session_{options_};
+  SessionOfRig session_{options_};
   Model model_{options_};
   std::size_t tick_ = 0;
   std::array<std::size_t, kCameras> begin_{};
-  std::array<EventPacket, kCameras> late_;
+  std::array<std::vector<Event>, kCameras> late_;
   std::array<std::uint64_t, kCameras> received_{};
   std::array<std::uint64_t, kCameras> taken_{};
   std::int64_t shift_ns_ = 0;

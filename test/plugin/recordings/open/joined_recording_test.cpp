@@ -24,7 +24,8 @@ std::string shortly(const Sample& sample) {
   }
   if (const auto* other = std::get_if<OtherSample>(&sample)) return other->type;
   const auto& packet = std::get<EventPacket>(sample);
-  return packet.label + "@" + std::to_string(*packet.t_ns / kMs) + ":" +
+  return "cam" + std::to_string(packet.camera) + "@" +
+         std::to_string(packet.events.front().t_ns / kMs) + ":" +
          std::to_string(packet.events.size());
 }
 
@@ -102,25 +103,25 @@ TEST_F(JoinedRecordingTest, IsInTheOrderOfTimeWithPosesBeforePacketsOfTheSameTim
       {"0.012 0 0 0\n0.018 0 0 0\n0.031 0 0 0\n", "0.015 0 0 0\n0.022 0 0 0\n"},
       {poseAt(31 * kMs), poseAt(5 * kMs), poseAt(12 * kMs), poseAt(16 * kMs), poseAt(90 * kMs)});
   EXPECT_THAT(shortly(readAll(*recording)),
-              ElementsAre("pose@5", "pose@12", "cam0@12:0", "cam1@12:0", "cam0@12:2", "cam1@15:1",
-                          "pose@16", "cam1@22:1", "pose@31", "cam0@31:1", "pose@90"));
+              ElementsAre("pose@5", "pose@12", "cam0@12:2", "cam1@15:1", "pose@16", "cam1@22:1",
+                          "pose@31", "cam0@31:1", "pose@90"));
 }
 
 TEST_F(JoinedRecordingTest, APacketHasItsCameraAndItsEvents) {
   const auto recording =
       open({"0.1 1 2 0\n", "0.100000049 3 4 1\n0.099 5 6 0\n", "0.205 0 0 0\n0.204 0 0 0\n"});
-  const std::vector<Event> expected[] = {
-      {}, {{99'000'000, 5, 6, false}}, {{100'000'049, 3, 4, true}}};
+  const std::vector<Event> expected[] = {{{99'000'000, 5, 6, false}}, {{100'000'049, 3, 4, true}}};
   const auto samples = readAll(*recording);
-  ASSERT_EQ(samples.size(), 7U);
-  for (const std::size_t i : {1, 3, 5}) {
+  ASSERT_EQ(samples.size(), 4U);
+  for (const std::size_t i : {0, 2}) {
     const auto& packet = std::get<EventPacket>(samples[i]);
-    EXPECT_EQ(packet.label, "cam1");
     EXPECT_EQ(packet.camera, 1);
-    EXPECT_TRUE(isSame(packet.calibration, recording->rig().cameras[1]));
-    EXPECT_EQ(packet.t_ns, i == 5 ? 100'000'049 : 99'000'000);
-    EXPECT_EQ(packet.events, expected[i / 2]);
+    EXPECT_EQ(packet.events.all(), expected[i / 2]);
   }
+  const std::vector<RecordedCamera> cameras = recording->cameras();
+  ASSERT_EQ(cameras.size(), 3U);
+  EXPECT_EQ(cameras[1].label, "cam1");
+  EXPECT_EQ(cameras[1].first_ns, 99'000'000);
   EXPECT_EQ(recording->counts().sorted_events, 2U);
   EXPECT_THAT(errorOf([&] {
                 open({"", "\n"}, {poseAt(0)});
@@ -135,7 +136,7 @@ TEST_F(JoinedRecordingTest, DamageOfThePosesComesLast) {
   const auto recording = join(std::move(torn), {});
   std::string error;
   EXPECT_THAT(readToError(*recording, error),
-              ElementsAre("pose@7", "pose@12", "cam0@12:0", "cam0@12:1", "cam0@23:1", "pose@50"));
+              ElementsAre("pose@7", "pose@12", "cam0@12:1", "cam0@23:1", "pose@50"));
   EXPECT_EQ(error, "torn");
   EXPECT_EQ(recording->position(), "the poses");
 }
@@ -145,8 +146,7 @@ TEST_F(JoinedRecordingTest, LatencyDelaysPosesBehindTheEventsOfItsTime) {
                            {poseAt(5 * kMs), poseAt(12 * kMs), poseAt(30 * kMs)});
   late.latency_ns = 11 * kMs;
   EXPECT_THAT(shortly(readAll(*join(std::move(late), {}))),
-              ElementsAre("cam0@12:0", "cam0@12:1", "pose@5", "pose@12", "cam0@23:1", "cam0@34:1",
-                          "pose@30"));
+              ElementsAre("cam0@12:1", "pose@5", "pose@12", "cam0@23:1", "cam0@34:1", "pose@30"));
 }
 
 TEST_F(JoinedRecordingTest, AnIntervalHasItsEventsAndOfEachSourceAPoseOnEitherSide) {
@@ -167,13 +167,12 @@ TEST_F(JoinedRecordingTest, AnIntervalHasItsEventsAndOfEachSourceAPoseOnEitherSi
   };
   // The event of camera 1 is at 18 ms on the poses' clock, but earlier on its own clock.
   EXPECT_THAT(cut(18 * kMs, 40 * kMs),
-              ElementsAre("slow@5", "pose@13", "cam0@17:0", "cam1@17:0", "cam1@17:1", "other18",
-                          "timeless", "cam0@18:1", "cam1@22:1", "pose@23", "cam0@31:1", "pose@33",
-                          "pose@43", "slow@50"));
+              ElementsAre("slow@5", "pose@13", "cam1@17:1", "other18", "timeless", "cam0@18:1",
+                          "cam1@22:1", "pose@23", "cam0@31:1", "pose@33", "pose@43", "slow@50"));
   EXPECT_THAT(cut(std::nullopt, 12 * kMs),
               ElementsAre("pose@3", "slow@5", "pose@13", "slow@50", "other10", "timeless"));
   EXPECT_THAT(cut(60 * kMs, std::nullopt), ElementsAre("slow@50", "pose@53", "timeless"));
-  EXPECT_EQ(cut({}, {}).size(), 2U + 5 + 8 + 4) << "without limits";
+  EXPECT_EQ(cut({}, {}).size(), 5U + 8 + 4) << "without limits";
   EXPECT_THROW(cut(kMs, kMs), std::invalid_argument);
 }
 
@@ -181,22 +180,11 @@ TEST_F(JoinedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
   const auto recording = open({"0.012 0 0 0\n0.018 0 0 0\n5 0 0 0\n", "0.015 0 0 0\n"});
   std::vector<std::optional<std::int64_t>> covered;
   for (const Sample& sample : readAll(*recording)) {
-    covered.push_back(std::get<EventPacket>(sample).covered_until_ns);
+    covered.push_back(std::get<EventPacket>(sample).complete_until_ns);
   }
-  EXPECT_THAT(covered, ElementsAre(12 * kMs, 15 * kMs,  // the empty packets
-                                   5000 * kMs,          // cam0's packet of 10 to 20 ms
-                                   kEndOfTimeNs,        // cam1's last packet
-                                   std::nullopt));      // the recording's last packet
-}
-
-TEST_F(JoinedRecordingTest, ACameraWithoutEventsIsSilentFromTheBeginning) {
-  const auto recording = open({"", "0.5 0 0 0\n0.6 0 0 0\n", "# nothing\n"});
-  const auto samples = readAll(*recording);
-  EXPECT_THAT(shortly(samples),
-              ElementsAre("cam0@500:0", "cam1@500:0", "cam2@500:0", "cam1@500:1", "cam1@600:1"));
-  for (const std::size_t silent : {0, 2}) {
-    EXPECT_EQ(std::get<EventPacket>(samples[silent]).covered_until_ns, kEndOfTimeNs);
-  }
+  EXPECT_THAT(covered, ElementsAre(5000 * kMs,      // cam0's packet of 10 to 20 ms
+                                   kEndOfTimeNs,    // cam1's last packet
+                                   std::nullopt));  // the recording's last packet
 }
 
 TEST_F(JoinedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
@@ -205,8 +193,7 @@ TEST_F(JoinedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
                               {poseAt(5 * kMs), poseAt(17 * kMs), poseAt(90 * kMs)});
   std::string error;
   EXPECT_THAT(readToError(*recording, error),
-              ElementsAre("pose@5", "cam0@11:0", "cam1@11:0", "cam1@11:2", "cam0@12:2", "pose@17",
-                          "pose@90"));
+              ElementsAre("pose@5", "cam1@11:2", "cam0@12:2", "pose@17", "pose@90"));
   EXPECT_THAT(error, HasSubstr("cam0/events.txt:3: '0.019 0 0'"));
 }
 

@@ -83,7 +83,8 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
       {"a.es", "Event Stream\2\0\0\1"s,
        ": an Event Stream file (.es): it is not read; of the arrays t, x, y and on that the Python "
        "package "
-       "event_stream reads, np.save('events.npy', ef.events(x, y, on, t)) makes a file that is read "
+       "event_stream reads, np.save('events.npy', ef.events(x, y, on, t)) makes a file that is "
+       "read "
        "(docs/recordings.md)"},
       {"bag/metadata.yaml", "rosbag2_bagfile_information:\n  version: 5\n",
        ": the description of a ROS 2 bag: expected its folder, FOLDER (docs/recordings.md)"},
@@ -112,10 +113,9 @@ struct Opened {
 Opened openedOf(const RecordingSource& source) {
   Opened opened;
   const auto recording = openRecording(source);
+  opened.width = recording->rig().cameras.at(0).model.width;
   while (const auto sample = recording->next()) {
-    const auto* events = std::get_if<EventPacket>(&*sample);
-    if (events != nullptr) opened.width = events->calibration.model.width;
-    if (events == nullptr) ++opened.poses;
+    if (std::holds_alternative<PoseSample>(*sample)) ++opened.poses;
   }
   EXPECT_THAT(recording->counts().warnings, testing::IsEmpty());
   for (const Warning& warning : recording->counts().notes) {
@@ -285,10 +285,12 @@ TEST_F(DatasetFolder, ReturnsEventsOfEachCameraAndPosesInOrder) {
   std::string labels;
   while (const auto sample = recording->next()) {
     const auto* packet = std::get_if<EventPacket>(&*sample);
-    labels += (packet ? packet->label : std::get<PoseSample>(*sample).source.label) + " ";
+    labels += (packet ? recording->cameras()[std::size_t(packet->camera)].label
+                      : std::get<PoseSample>(*sample).source.label) +
+              " ";
   }
   EXPECT_NEAR(recording->rig().cameras[1].T_rig_cam.translation.x(), 0.1, 1e-15);
-  EXPECT_EQ(labels, "pose cam0 cam1 cam0 cam1 pose ");
+  EXPECT_EQ(labels, "pose cam0 cam1 pose ");
   write("cam7/events.txt", "nonsense\n");
   write("notes.txt", "nonsense\n");
   std::filesystem::rename(folder() / "poses.txt", folder() / "groundtruth.txt");

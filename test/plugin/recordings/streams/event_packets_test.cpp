@@ -75,8 +75,8 @@ TEST(EventPackets, AnIntervalIsReadAsFarAsLateEventsOfItMayCome) {
     packets.startAt(kBegin);
     packets.stopAt(kEnd);
     EXPECT_EQ(sought_ns, kBegin - kMaxEventDelayNs);
-    EXPECT_THAT(timesOf(packets.nextPacket()), ElementsAre(kBegin));
-    EXPECT_THAT(timesOf(packets.nextPacket()), ElementsAre(kEnd - 1));
+    EXPECT_THAT(timesOf(packets.nextPacket().all()), ElementsAre(kBegin));
+    EXPECT_THAT(timesOf(packets.nextPacket().all()), ElementsAre(kEnd - 1));
     EXPECT_EQ(packets.nextTime(), whole ? std::nullopt : std::optional(last));
     EXPECT_EQ(packets.isAtDamage(), !whole);
     EXPECT_THAT(packets.nextPacket(), IsEmpty());
@@ -102,7 +102,7 @@ TEST(EventPackets, ArePeriodsOfTheGridAroundZero) {
                          {1, 1}, period_ns);
     for (const auto& packet : expected) {
       EXPECT_EQ(packets.nextTime(), packet.front());
-      EXPECT_EQ(timesOf(packets.nextPacket()), packet);
+      EXPECT_EQ(timesOf(packets.nextPacket().all()), packet);
     }
     EXPECT_EQ(packets.nextTime(), all.back().t_ns) << "the newest before the damage";
     EXPECT_THAT(packets.nextPacket(), IsEmpty());

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "mapping/base/atomic_file.h"
-#include "maps/io/npy_header.h"
+#include "mapping/base/npy_header.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
 #include "test/plugin/temporary_folder.h"

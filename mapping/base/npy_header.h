@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "maps/io/point_record.h"
+#include "mapping/base/number_bytes.h"
 
 namespace efm {
 

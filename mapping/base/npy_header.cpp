@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/io/npy_header.h"
+#include "mapping/base/npy_header.h"
 
 #include <algorithm>
 #include <optional>

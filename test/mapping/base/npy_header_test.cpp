@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/io/npy_header.h"
+#include "mapping/base/npy_header.h"
 
 #include <gmock/gmock.h>
 
@@ -23,7 +23,7 @@ std::string dictionary(const std::string& descr, const std::string& shape = "(3,
   return "{'descr': " + descr + ", 'fortran_order': False, 'shape': " + shape + ", }\n";
 }
 
-std::string errorOf(const std::string& bytes) {
+std::string errorOfHeader(const std::string& bytes) {
   return messageOf([&] { parseNpyHeader(bytes); });
 }
 
@@ -110,8 +110,8 @@ TEST(NpyHeader, WrongOnesAreErrorsThatSayWhatIsWrong) {
     return npy(dictionary(descr, shape));
   };
   const std::string whole = npy(dictionary("'<f4'"));
-  EXPECT_EQ(errorOf(nested(9)), "no error");
-  EXPECT_EQ(errorOf(list("[('a', '|V65535'), ('b', '|u1')]")), "no error");
+  EXPECT_EQ(errorOfHeader(nested(9)), "no error");
+  EXPECT_EQ(errorOfHeader(list("[('a', '|V65535'), ('b', '|u1')]")), "no error");
   const std::pair<std::string, std::string> cases[] = {
       {"\x93NUMPX" + whole.substr(6), "does not begin as a NumPy array"},
       {whole.substr(0, 9), "the file ends inside it"},
@@ -149,7 +149,7 @@ TEST(NpyHeader, WrongOnesAreErrorsThatSayWhatIsWrong) {
       {shaped("[('a', '|V16')]", "(9007199254740992,)"), "at most 2^53 numbers"},
   };
   for (const auto& [bytes, expected] : cases) {
-    EXPECT_THAT(errorOf(bytes),
+    EXPECT_THAT(errorOfHeader(bytes),
                 testing::AllOf(HasSubstr("the array's header: "), HasSubstr(expected)))
         << bytes;
   }
