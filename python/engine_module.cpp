@@ -197,7 +197,7 @@ ValueError
                    "K: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew");
              }
              RigCamera camera{{width, height, K(0, 0), K(1, 1), K(0, 2), K(1, 2),
-                               distortionModelFromName(distortion), std::move(coefficients)},
+                               fromName<DistortionModel>(distortion), std::move(coefficients)},
                               T_rig_cam ? rigidOf(*T_rig_cam, "T_rig_cam") : Rigid3{},
                               time_offset_ns};
              camera.validate();

@@ -26,6 +26,10 @@ struct NamedChoice {
   std::string_view name;
 };
 
+/// All enumerators of an enumeration: a specialisation is a table of NamedChoice.
+template <typename Enum>
+inline constexpr int kNamesOf = 0;
+
 /// Returns the name of an enumerator. `table` has all enumerators.
 template <typename Enum, std::size_t N>
 std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
@@ -45,6 +49,17 @@ Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   }
   throw std::invalid_argument("'" + std::string(name) +
                               "' is unknown: " + expectedName(name, known));
+}
+
+/// Returns the name of an enumerator, in option files and messages.
+template <typename Enum>
+std::string_view nameOf(Enum value) {
+  return nameIn(kNamesOf<Enum>, value);
+}
+/// Returns the enumerator with a name. @throws std::invalid_argument if the name is unknown.
+template <typename Enum>
+Enum fromName(std::string_view name) {
+  return valueIn(kNamesOf<Enum>, name);
 }
 
 }  // namespace efm

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/base/picture_file.h"
 
-#include <png.h>
+#include <spng.h>
 #include <tiffio.h>
 #include <zlib.h>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cassert>
-#include <csetjmp>
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -40,8 +41,15 @@ void requireBelievable(std::uint64_t width, std::uint64_t height, std::uint64_t 
   }
 }
 
-/// Input and output of libpng or libtiff: the bytes that the library reads, or, if there are none,
-/// the bytes that it writes. Also the first error that it reported.
+constexpr const char* kDamaged = "the image is damaged or cut short";
+constexpr const char* kNotWritten = "no picture can be made";
+
+std::runtime_error pictureError(const std::string& what, std::string_view why) {
+  return std::runtime_error(why.empty() ? what : what + " (" + printable(why) + ")");
+}
+
+/// Input and output of libtiff: the bytes that it reads, or, if there are none, the bytes that it
+/// writes. Also the first error that it reported.
 struct CodecBytes {
   std::string_view input;
   std::string output;
@@ -66,112 +74,55 @@ struct CodecBytes {
     at += count;
     return true;
   }
-  std::runtime_error failed(const std::string& what) const {
-    const std::string why = error[0] == '\0' ? "" : " (" + printable(error, sizeof(error)) + ")";
-    return std::runtime_error(what + why);
-  }
-  std::runtime_error damaged() const { return failed("the image is damaged or cut short"); }
-  std::runtime_error notWritten() const { return failed("no picture can be made"); }
+  std::runtime_error damaged() const { return pictureError(kDamaged, error); }
+  std::runtime_error notWritten() const { return pictureError(kNotWritten, error); }
 };
 
-/// The state of libpng.
-class PngCodec {
- public:
-  explicit PngCodec(CodecBytes& bytes) : reads_(!bytes.input.empty()) {
-    const auto create = reads_ ? png_create_read_struct : png_create_write_struct;
-    png = create(PNG_LIBPNG_VER_STRING, &bytes, fail, [](png_structp, png_const_charp) {});
-    if (png != nullptr) info = png_create_info_struct(png);
-    if (info == nullptr) {
-      destroy();
-      throw std::bad_alloc();
-    }
-    if (reads_) {
-      png_set_read_fn(png, &bytes, [](png_structp self, png_bytep to, std::size_t count) {
-        if (of(self).take(to, count) != count) png_error(self, "its end is missing");
-      });
-    } else {
-      const auto write = [](png_structp self, png_bytep from, std::size_t count) {
-        if (!of(self).put(from, count)) png_error(self, "not enough memory");
-      };
-      png_set_write_fn(png, &bytes, write, [](png_structp) {});
-    }
-  }
-  ~PngCodec() { destroy(); }
-  PngCodec(const PngCodec&) = delete;
-  PngCodec& operator=(const PngCodec&) = delete;
+using PngCodec = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 
-  /// Returns false after a longjmp of libpng: `calls` must not have objects with destructors.
-  template <typename Calls>
-  bool succeeds(const Calls& calls) {
-    if (setjmp(png_jmpbuf(png)) != 0) return false;
-    calls();
-    return true;
-  }
+PngCodec pngCodec(int flags) {
+  PngCodec codec(spng_ctx_new(flags), spng_ctx_free);
+  if (codec == nullptr) throw std::bad_alloc();
+  return codec;
+}
 
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-
- private:
-  static CodecBytes& of(png_structp png) {
-    return *static_cast<CodecBytes*>(png_get_error_ptr(png));
-  }
-  static void fail(png_structp png, png_const_charp message) {
-    std::snprintf(of(png).error, sizeof(CodecBytes::error), "%s", message);
-    png_longjmp(png, 1);
-  }
-  void destroy() {
-    if (reads_) {
-      png_destroy_read_struct(&png, &info, nullptr);
-    } else {
-      png_destroy_write_struct(&png, &info);
-    }
-  }
-
-  bool reads_;
-};
-
-std::vector<png_bytep> rowsOf(const cv::Mat& picture) {
-  std::vector<png_bytep> rows(static_cast<std::size_t>(picture.rows));
-  for (int y = 0; y < picture.rows; ++y) {
-    rows[static_cast<std::size_t>(y)] = const_cast<png_bytep>(picture.ptr(y));
-  }
-  return rows;
+/// @param status of a call of libspng.
+void requirePng(int status, const char* what) {
+  if (status == SPNG_EMEM) throw std::bad_alloc();
+  if (status != SPNG_OK) throw pictureError(what, spng_strerror(status));
 }
 
 cv::Mat decodePng(std::string_view input) {
-  CodecBytes bytes;
-  bytes.input = input;
-  PngCodec codec(bytes);
-  png_structp png = codec.png;
-  png_infop info = codec.info;
-  if (!codec.succeeds([&] { png_read_info(png, info); })) throw bytes.damaged();
-  const png_uint_32 width = png_get_image_width(png, info);
-  const png_uint_32 height = png_get_image_height(png, info);
-  requireBelievable(width, height, png_get_rowbytes(png, info), input.size());
-  const bool prepared = codec.succeeds([&] {
-    const int colours = png_get_color_type(png, info);
-    if (colours == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
-    if (colours == PNG_COLOR_TYPE_GRAY) png_set_expand_gray_1_2_4_to_8(png);
-    if (colours == PNG_COLOR_TYPE_GRAY_ALPHA) png_set_gray_to_rgb(png);
-    if (colours == PNG_COLOR_TYPE_RGB && png_get_valid(png, info, PNG_INFO_tRNS) != 0) {
-      png_set_tRNS_to_alpha(png);
-    }
-    png_set_bgr(png);
-    const std::uint16_t one = 1;
-    if (*reinterpret_cast<const char*>(&one) == 1) png_set_swap(png);
-    png_set_interlace_handling(png);
-    png_read_update_info(png, info);
-  });
-  if (!prepared) throw bytes.damaged();
-  const int depth = png_get_bit_depth(png, info) == 16 ? CV_16U : CV_8U;
-  cv::Mat picture(static_cast<int>(height), static_cast<int>(width),
-                  CV_MAKETYPE(depth, png_get_channels(png, info)));
-  std::vector<png_bytep> rows = rowsOf(picture);
-  const bool complete = codec.succeeds([&] {
-    png_read_image(png, rows.data());
-    png_read_end(png, nullptr);
-  });
-  if (!complete) throw bytes.damaged();
+  const PngCodec codec = pngCodec(0);
+  spng_ctx* const png = codec.get();
+  requirePng(spng_set_png_buffer(png, input.data(), input.size()), kDamaged);
+  spng_ihdr header{};
+  requirePng(spng_get_ihdr(png, &header), kDamaged);
+  requireBelievable(header.width, header.height, std::uint64_t{header.width}, input.size());
+  spng_trns transparent{};
+  const int transparency = spng_get_trns(png, &transparent);
+  if (transparency != SPNG_ECHUNKAVAIL) requirePng(transparency, kDamaged);
+  const int colours = header.color_type;
+  const bool grey = colours == SPNG_COLOR_TYPE_GRAYSCALE;
+  const bool alpha = colours == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA ||
+                     colours == SPNG_COLOR_TYPE_TRUECOLOR_ALPHA ||
+                     (!grey && transparency == SPNG_OK);
+  const bool deep = header.bit_depth == 16;
+  const int channels = grey ? 1 : alpha ? 4 : 3;
+  const int format = alpha  ? (deep ? SPNG_FMT_RGBA16 : SPNG_FMT_RGBA8)
+                     : deep ? SPNG_FMT_PNG
+                     : grey ? SPNG_FMT_G8
+                            : SPNG_FMT_RGB8;
+  std::size_t bytes = 0;
+  requirePng(spng_decoded_image_size(png, format, &bytes), kDamaged);
+  requireBelievable(header.width, header.height, bytes / header.height, input.size());
+  cv::Mat picture(static_cast<int>(header.height), static_cast<int>(header.width),
+                  CV_MAKETYPE(deep ? CV_16U : CV_8U, channels));
+  requirePng(spng_decode_image(png, picture.data, bytes, format, alpha ? SPNG_DECODE_TRNS : 0),
+             kDamaged);
+  requirePng(spng_decode_chunks(png), kDamaged);  // up to the end of the file
+  if (channels == 3) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
+  if (channels == 4) cv::cvtColor(picture, picture, cv::COLOR_RGBA2BGRA);
   return picture;
 }
 
@@ -337,29 +288,35 @@ std::string beginning(std::string_view bytes) {
 
 std::string encodePng(const cv::Mat& picture, PngPacking packing) {
   assert(picture.type() == CV_8UC1 || picture.type() == CV_8UC3);
-  CodecBytes bytes;
-  PngCodec codec(bytes);
-  png_structp png = codec.png;
-  std::vector<png_bytep> rows = rowsOf(picture);
-  const bool written = codec.succeeds([&] {
-    if (packing == PngPacking::kRuns) {
-      png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
-      png_set_compression_strategy(png, Z_RLE);
-    } else {
-      png_set_compression_strategy(png, Z_DEFAULT_STRATEGY);
-    }
-    png_set_compression_level(png, packing == PngPacking::kSmall ? 6 : 1);
-    png_set_IHDR(png, codec.info, static_cast<png_uint_32>(picture.cols),
-                 static_cast<png_uint_32>(picture.rows), 8,
-                 picture.channels() == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
-                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_write_info(png, codec.info);
-    png_set_bgr(png);
-    png_write_image(png, rows.data());
-    png_write_end(png, codec.info);
-  });
-  if (!written) throw bytes.notWritten();
-  return std::move(bytes.output);
+  const PngCodec codec = pngCodec(SPNG_CTX_ENCODER);
+  spng_ctx* const png = codec.get();
+  const bool grey = picture.channels() == 1;
+  const bool runs = packing == PngPacking::kRuns;
+  spng_set_option(png, SPNG_ENCODE_TO_BUFFER, 1);
+  spng_set_option(png, SPNG_IMG_COMPRESSION_LEVEL, packing == PngPacking::kSmall ? 6 : 1);
+  spng_set_option(png, SPNG_IMG_COMPRESSION_STRATEGY, runs ? Z_RLE : Z_DEFAULT_STRATEGY);
+  if (runs) spng_set_option(png, SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_SUB);
+  spng_ihdr header{};
+  header.width = static_cast<std::uint32_t>(picture.cols);
+  header.height = static_cast<std::uint32_t>(picture.rows);
+  header.bit_depth = 8;
+  header.color_type = grey ? SPNG_COLOR_TYPE_GRAYSCALE : SPNG_COLOR_TYPE_TRUECOLOR;
+  requirePng(spng_set_ihdr(png, &header), kNotWritten);
+  cv::Mat pixels;
+  if (grey) {
+    pixels = picture.isContinuous() ? picture : picture.clone();
+  } else {
+    cv::cvtColor(picture, pixels, cv::COLOR_BGR2RGB);
+  }
+  requirePng(spng_encode_image(png, pixels.data, pixels.total() * pixels.elemSize(), SPNG_FMT_PNG,
+                               SPNG_ENCODE_FINALIZE),
+             kNotWritten);
+  std::size_t size = 0;
+  int status = 0;
+  const std::unique_ptr<void, decltype(&std::free)> file(spng_get_png_buffer(png, &size, &status),
+                                                         std::free);
+  requirePng(status, kNotWritten);
+  return {static_cast<const char*>(file.get()), size};
 }
 
 std::string encodeTiff(const cv::Mat1f& image) {

@@ -6,22 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/depth/aggregated_extraction.h"
 #include "mapping/depth/peak_fit.h"
 
 namespace efm {
-namespace {
-
-constexpr NamedChoice<ExtractionMethod> kMethods[] = {
-    {ExtractionMethod::kPaper, "paper"},
-    {ExtractionMethod::kAggregated, "aggregated"},
-};
-
-}  // namespace
-
-std::string_view nameOf(ExtractionMethod method) { return nameIn(kMethods, method); }
-ExtractionMethod extractionMethodFromName(std::string_view name) { return valueIn(kMethods, name); }
 
 void DepthExtractionOptions::validate() const {
   requireFields(*this);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/depth/depth_map.h"
 #include "mapping/dsi/dsi_columns.h"
@@ -20,8 +21,11 @@ enum class ExtractionMethod {
   kAggregated,
 };
 
-std::string_view nameOf(ExtractionMethod method);
-ExtractionMethod extractionMethodFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<ExtractionMethod> kNamesOf<ExtractionMethod>[] = {
+    {ExtractionMethod::kPaper, "paper"},
+    {ExtractionMethod::kAggregated, "aggregated"},
+};
 
 /// The confidence that becomes white: 255 in the 8-bit image that is thresholded.
 enum class WhiteLevel {

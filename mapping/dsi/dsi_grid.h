@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/events/event_fate.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
@@ -36,10 +37,12 @@ struct DsiGrid {
   DepthPlanes planes;
 };
 
-/// Returns "plain", "baseline", "sse4", "avx2", "avx512" or "neon".
-std::string_view nameOf(VotingKernel kernel);
-/// Accepts also the names of kernels that this processor lacks.
-VotingKernel votingKernelFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<VotingKernel> kNamesOf<VotingKernel>[] = {
+    {VotingKernel::kPlain, "plain"},   {VotingKernel::kBaseline, "baseline"},
+    {VotingKernel::kSse4, "sse4"},     {VotingKernel::kAvx2, "avx2"},
+    {VotingKernel::kAvx512, "avx512"}, {VotingKernel::kNeon, "neon"},
+};
 
 /// Returns the kernels of this build that this processor can run, plain first.
 const std::vector<VotingKernel>& availableKernels();

@@ -5,26 +5,9 @@
 #include <cassert>
 #include <stdexcept>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/kernels/kernels.h"
 
 namespace efm {
-namespace {
-
-constexpr NamedChoice<FusionRule> kRules[] = {
-    {FusionRule::kMin, "min"},
-    {FusionRule::kHarmonic, "harmonic"},
-    {FusionRule::kGeometric, "geometric"},
-    {FusionRule::kArithmetic, "arithmetic"},
-    {FusionRule::kRms, "rms"},
-    {FusionRule::kMax, "max"},
-    {FusionRule::kPairs, "pairs"},
-};
-
-}  // namespace
-
-std::string_view nameOf(FusionRule rule) { return nameIn(kRules, rule); }
-FusionRule fusionRuleFromName(std::string_view name) { return valueIn(kRules, name); }
 
 bool isAndLike(FusionRule rule) {
   return rule == FusionRule::kMin || rule == FusionRule::kHarmonic ||
@@ -34,7 +17,7 @@ bool isAndLike(FusionRule rule) {
 const std::vector<FusionRule>& allFusionRules() {
   static const std::vector<FusionRule> rules = [] {
     std::vector<FusionRule> all;
-    for (const auto& choice : kRules) {
+    for (const auto& choice : kNamesOf<FusionRule>) {
       if (choice.value != FusionRule::kPairs) all.push_back(choice.value);
     }
     return all;
@@ -121,11 +104,6 @@ void FusionAccumulator::addPairs(const PlaneValues& values, bool first) {
 
 namespace {
 
-constexpr NamedChoice<FusionOrder> kOrders[] = {
-    {FusionOrder::kCamerasThenTime, "cameras_then_time"},
-    {FusionOrder::kTimeThenCameras, "time_then_cameras"},
-};
-
 bool camerasFirst(const FusionOptions& options) {
   return options.order == FusionOrder::kCamerasThenTime;
 }
@@ -150,9 +128,6 @@ void FusionOptions::validate() const {
   requireOption(across_time != FusionRule::kPairs, "across_time", nameOf(across_time),
                 "a mean: pairs are of cameras");
 }
-
-std::string_view nameOf(FusionOrder order) { return nameIn(kOrders, order); }
-FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders, name); }
 
 PlaneFusion::PlaneFusion(const FusionOptions& options, const FusionInputs& inputs,
                          std::size_t voxels, Keep keep)

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/dsi/dsi_grid.h"
 
@@ -23,9 +24,16 @@ struct FusionSteps;
 /// need to see an edge. Of two inputs it is the harmonic mean.
 enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax, kPairs };
 
-/// Returns "min", "harmonic", "geometric", "arithmetic", "rms", "max" or "pairs".
-std::string_view nameOf(FusionRule rule);
-FusionRule fusionRuleFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<FusionRule> kNamesOf<FusionRule>[] = {
+    {FusionRule::kMin, "min"},
+    {FusionRule::kHarmonic, "harmonic"},
+    {FusionRule::kGeometric, "geometric"},
+    {FusionRule::kArithmetic, "arithmetic"},
+    {FusionRule::kRms, "rms"},
+    {FusionRule::kMax, "max"},
+    {FusionRule::kPairs, "pairs"},
+};
 /// Returns whether the mean is zero if any input is zero.
 bool isAndLike(FusionRule rule);
 /// Returns all means, in the order of the enum.
@@ -70,9 +78,11 @@ class FusionAccumulator {
 /// The axis that is fused first. The paper has S_t∘S_c for cameras first, S_c∘S_t for time first.
 enum class FusionOrder { kCamerasThenTime, kTimeThenCameras };
 
-/// Returns "cameras_then_time" or "time_then_cameras".
-std::string_view nameOf(FusionOrder order);
-FusionOrder fusionOrderFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<FusionOrder> kNamesOf<FusionOrder>[] = {
+    {FusionOrder::kCamerasThenTime, "cameras_then_time"},
+    {FusionOrder::kTimeThenCameras, "time_then_cameras"},
+};
 
 /// The fusion of the DSIs of several cameras and sub-intervals (Ghosh and Gallego 2022, Sec. 3.4
 /// and 3.5): any rule on either axis, in either order. Algorithm 1 is harmonic across cameras with

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/geometry/timestamp.h"
 
@@ -21,16 +20,6 @@ void TimeLimits::validate() const {
 
 namespace {
 
-constexpr NamedChoice<SubintervalSplit> kSplits[] = {
-    {SubintervalSplit::kDuration, "duration"},
-    {SubintervalSplit::kCount, "count"},
-};
-constexpr NamedChoice<SubintervalShuffle> kShuffles[] = {
-    {SubintervalShuffle::kNone, "none"},
-    {SubintervalShuffle::kShift, "shift"},
-    {SubintervalShuffle::kRandom, "random"},
-};
-
 /// Shuffles as Fisher and Yates. std::shuffle may draw differently with another standard library.
 void shuffleWith(std::mt19937& random, std::vector<int>& items) {
   for (std::size_t left = items.size(); left > 1; --left) {
@@ -39,13 +28,6 @@ void shuffleWith(std::mt19937& random, std::vector<int>& items) {
 }
 
 }  // namespace
-
-std::string_view nameOf(SubintervalSplit split) { return nameIn(kSplits, split); }
-std::string_view nameOf(SubintervalShuffle shuffle) { return nameIn(kShuffles, shuffle); }
-SubintervalSplit subintervalSplitFromName(std::string_view name) { return valueIn(kSplits, name); }
-SubintervalShuffle subintervalShuffleFromName(std::string_view name) {
-  return valueIn(kShuffles, name);
-}
 
 std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_ns,
                                              std::int64_t t1_ns,

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/events/event.h"
 #include "mapping/geometry/lens.h"
@@ -50,10 +51,17 @@ enum class SubintervalShuffle {
   kRandom,  ///< Each camera's sub-intervals are permuted at random.
 };
 
-std::string_view nameOf(SubintervalSplit split);
-std::string_view nameOf(SubintervalShuffle shuffle);
-SubintervalSplit subintervalSplitFromName(std::string_view name);
-SubintervalShuffle subintervalShuffleFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<SubintervalSplit> kNamesOf<SubintervalSplit>[] = {
+    {SubintervalSplit::kDuration, "duration"},
+    {SubintervalSplit::kCount, "count"},
+};
+template <>
+inline constexpr NamedChoice<SubintervalShuffle> kNamesOf<SubintervalShuffle>[] = {
+    {SubintervalShuffle::kNone, "none"},
+    {SubintervalShuffle::kShift, "shift"},
+    {SubintervalShuffle::kRandom, "random"},
+};
 
 /// Options of the sub-intervals of a window. Each sub-interval has a DSI per camera (Ghosh and
 /// Gallego 2022, Algorithm 2, line 3).

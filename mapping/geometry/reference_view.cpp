@@ -6,17 +6,11 @@
 #include <cstdint>
 #include <string>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<PlaneSpacing> kSpacings[] = {
-    {PlaneSpacing::kInverse, "inverse"},
-    {PlaneSpacing::kLinear, "linear"},
-};
 
 /// Converts depth to the quantity that is uniform over the planes. The same function converts back.
 double uniformOf(PlaneSpacing spacing, double depth_m) {
@@ -24,9 +18,6 @@ double uniformOf(PlaneSpacing spacing, double depth_m) {
 }
 
 }  // namespace
-
-std::string_view nameOf(PlaneSpacing spacing) { return nameIn(kSpacings, spacing); }
-PlaneSpacing planeSpacingFromName(std::string_view name) { return valueIn(kSpacings, name); }
 
 void DepthPlanesOptions::validate() const {
   // No camera sees larger depths, and planes and votes would lose digits.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/geometry/rig.h"
 
@@ -18,8 +19,11 @@ enum class PlaneSpacing {
   kLinear,   ///< Uniform in depth.
 };
 
-std::string_view nameOf(PlaneSpacing spacing);
-PlaneSpacing planeSpacingFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<PlaneSpacing> kNamesOf<PlaneSpacing>[] = {
+    {PlaneSpacing::kInverse, "inverse"},
+    {PlaneSpacing::kLinear, "linear"},
+};
 
 /// Smallest depth of a plane, metres.
 inline constexpr double kMinDepthM = 1e-3;

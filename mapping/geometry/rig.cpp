@@ -12,19 +12,12 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<DistortionModel> kDistortionModels[] = {
-    {DistortionModel::kNone, "none"},
-    {DistortionModel::kRadtan, "radtan"},
-    {DistortionModel::kEquidistant, "equidistant"},
-};
 
 struct CoefficientCount {
   bool allowed;
@@ -44,11 +37,6 @@ CoefficientCount checkCoefficientCount(DistortionModel model, std::size_t count)
 }
 
 }  // namespace
-
-std::string_view nameOf(DistortionModel model) { return nameIn(kDistortionModels, model); }
-DistortionModel distortionModelFromName(std::string_view name) {
-  return valueIn(kDistortionModels, name);
-}
 
 CameraModel cutTo(const SensorArea& area, CameraModel model) {
   const auto cut = [](double binning, double from, double count, int& side, double& f, double& c) {

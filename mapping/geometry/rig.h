@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
@@ -18,9 +19,12 @@ enum class DistortionModel {
   kEquidistant,  ///< Kannala-Brandt fisheye: k1 k2 k3 k4.
 };
 
-/// Returns "none", "radtan" or "equidistant", as Kalibr names the models.
-std::string_view nameOf(DistortionModel model);
-DistortionModel distortionModelFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<DistortionModel> kNamesOf<DistortionModel>[] = {
+    {DistortionModel::kNone, "none"},
+    {DistortionModel::kRadtan, "radtan"},
+    {DistortionModel::kEquidistant, "equidistant"},
+};
 
 /// Intrinsic calibration of one camera: frame `cam` has x right, y down, z forward; integer pixel
 /// coordinates are pixel centres.

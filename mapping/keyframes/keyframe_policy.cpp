@@ -6,21 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<KeyframePolicyKind> kPolicies[] = {
-    {KeyframePolicyKind::kPeriod, "period"},
-    {KeyframePolicyKind::kEvents, "events"},
-    {KeyframePolicyKind::kBaseline, "baseline"},
-};
-constexpr NamedChoice<ReferenceTime> kReferences[] = {
-    {ReferenceTime::kMiddle, "middle"},
-    {ReferenceTime::kEnd, "end"},
-};
 
 /// Window k starts at the recording's start + k strides.
 class PeriodPolicy : public KeyframePolicy {
@@ -305,13 +294,6 @@ class SingleWindowPolicy : public KeyframePolicy {
 };
 
 }  // namespace
-
-std::string_view nameOf(KeyframePolicyKind policy) { return nameIn(kPolicies, policy); }
-std::string_view nameOf(ReferenceTime reference) { return nameIn(kReferences, reference); }
-KeyframePolicyKind keyframePolicyFromName(std::string_view name) {
-  return valueIn(kPolicies, name);
-}
-ReferenceTime referenceTimeFromName(std::string_view name) { return valueIn(kReferences, name); }
 
 Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference) {
   const bool middle = reference == ReferenceTime::kMiddle;

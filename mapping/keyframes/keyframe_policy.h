@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rigid3.h"
@@ -25,10 +26,17 @@ enum class ReferenceTime {
   kEnd,  ///< The end of the window, for forward-looking vehicles.
 };
 
-std::string_view nameOf(KeyframePolicyKind policy);
-std::string_view nameOf(ReferenceTime reference);
-KeyframePolicyKind keyframePolicyFromName(std::string_view name);
-ReferenceTime referenceTimeFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<KeyframePolicyKind> kNamesOf<KeyframePolicyKind>[] = {
+    {KeyframePolicyKind::kPeriod, "period"},
+    {KeyframePolicyKind::kEvents, "events"},
+    {KeyframePolicyKind::kBaseline, "baseline"},
+};
+template <>
+inline constexpr NamedChoice<ReferenceTime> kNamesOf<ReferenceTime>[] = {
+    {ReferenceTime::kMiddle, "middle"},
+    {ReferenceTime::kEnd, "end"},
+};
 
 struct KeyframePolicyOptions {
   KeyframePolicyKind policy = KeyframePolicyKind::kPeriod;

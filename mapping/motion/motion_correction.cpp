@@ -6,16 +6,11 @@
 #include <cstddef>
 #include <optional>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<MotionCorrectionUse> kUses[] = {{MotionCorrectionUse::kNever, "false"},
-                                                      {MotionCorrectionUse::kAlways, "true"},
-                                                      {MotionCorrectionUse::kAuto, "auto"}};
 
 constexpr std::size_t kWatched = 3;  // windows
 constexpr int kLookEvery = 8;
@@ -26,11 +21,6 @@ constexpr int kLookEvery = 8;
 constexpr double kBlurPx = 0.4;
 
 }  // namespace
-
-std::string_view nameOf(MotionCorrectionUse use) { return nameIn(kUses, use); }
-MotionCorrectionUse motionCorrectionUseFromName(std::string_view name) {
-  return valueIn(kUses, name);
-}
 
 bool BlurWatch::isOn() const {
   std::vector<double> sorted = last_px_;

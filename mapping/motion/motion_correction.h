@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/trajectory.h"
@@ -18,9 +19,11 @@ enum class MotionCorrectionUse {
   kAuto,    ///< Where the poses blur the events: see `BlurWatch`. Needs several cameras.
 };
 
-std::string_view nameOf(MotionCorrectionUse use);
-/// @throws std::invalid_argument if the name is unknown.
-MotionCorrectionUse motionCorrectionUseFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<MotionCorrectionUse> kNamesOf<MotionCorrectionUse>[] = {
+    {MotionCorrectionUse::kNever, "false"},
+    {MotionCorrectionUse::kAlways, "true"},
+    {MotionCorrectionUse::kAuto, "auto"}};
 
 /// Correction of the motion within a window. Trackers wander by some per cent of their travel
 /// within tenths of a second. A window then has a wrong motion, which blurs the DSI. The correction

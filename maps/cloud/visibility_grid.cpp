@@ -5,24 +5,9 @@
 #include <cmath>
 #include <iterator>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 
 namespace efm {
-namespace {
-
-constexpr NamedChoice<Consistency> kConsistencies[] = {
-    {Consistency::kNone, "none"},
-    {Consistency::kSupport, "support"},
-    {Consistency::kVisibility, "visibility"},
-};
-
-}  // namespace
-
-std::string_view nameOf(Consistency consistency) { return nameIn(kConsistencies, consistency); }
-
-Consistency consistencyFromName(std::string_view name) { return valueIn(kConsistencies, name); }
-
 namespace {
 
 /// The maximum of |x| / z and |y| / z in a view.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_points.h"
@@ -21,8 +22,12 @@ enum class Consistency {
   kVisibility,  ///< As kSupport; points that violate free space without support are excluded.
 };
 
-std::string_view nameOf(Consistency consistency);
-Consistency consistencyFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<Consistency> kNamesOf<Consistency>[] = {
+    {Consistency::kNone, "none"},
+    {Consistency::kSupport, "support"},
+    {Consistency::kVisibility, "visibility"},
+};
 
 struct ConsistencyOptions {
   /// Keyframes measure depth from different events. Their correct depths agree, wrong depths seldom

@@ -88,7 +88,7 @@ void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
   if (version == 0) return;
   std::string name;
   in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
-  options.consistency = consistencyFromName(name);
+  options.consistency = fromName<Consistency>(name);
   options.max_contradictions = in.ReadAs<std::int32_t>();
 }
 

@@ -47,7 +47,7 @@ CameraModel readCamera(CArchive& in) {
   camera.width = in.ReadAs<std::int32_t>();
   camera.height = in.ReadAs<std::int32_t>();
   in >> camera.fx >> camera.fy >> camera.cx >> camera.cy;
-  camera.distortion = distortionModelFromName(in.ReadAs<std::string>());
+  camera.distortion = fromName<DistortionModel>(in.ReadAs<std::string>());
   in >> camera.coefficients;
   return camera;
 }

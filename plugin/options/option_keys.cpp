@@ -73,13 +73,6 @@ double degreesThatReadAs(double angle_rad) {
   return angle_deg;
 }
 
-// Functions that read the names of choices. The error of an unknown name shows the name.
-constexpr auto kChoices =
-    std::make_tuple(keyframePolicyFromName, referenceTimeFromName, planeSpacingFromName,
-                    fusionRuleFromName, fusionOrderFromName, subintervalSplitFromName,
-                    subintervalShuffleFromName, extractionMethodFromName, votingKernelFromName,
-                    consistencyFromName, motionCorrectionUseFromName);
-
 template <typename Field>
 constexpr bool kIsOptional = false;
 template <typename Value>
@@ -92,7 +85,7 @@ void parseInto(std::string_view text, double unit, Field& field) {
   if constexpr (kIsOptional<Field>) {
     parseInto(text, unit, field.emplace());
   } else if constexpr (std::is_enum_v<Field>) {
-    field = std::get<Field (*)(std::string_view)>(kChoices)(printable(text));
+    field = fromName<Field>(printable(text));
   } else if constexpr (std::is_same_v<Field, bool>) {
     if (text != "true" && text != "false") throw std::invalid_argument("must be true or false");
     field = text == "true";

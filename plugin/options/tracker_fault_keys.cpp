@@ -20,7 +20,7 @@ template <typename Field>
 const char* readFault(std::string_view text, const Allowed& allowed, Field& field) {
   if constexpr (std::is_same_v<Field, TrackerClass>) {
     try {
-      field = trackerClassFromName(text);
+      field = fromName<TrackerClass>(text);
     } catch (const std::invalid_argument&) {
       return "good, typical, poor, car or none";
     }

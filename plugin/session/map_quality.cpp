@@ -6,16 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<QualityWord> kWords[] = {{QualityWord::kUnknown, "unknown"},
-                                               {QualityWord::kGood, "good"},
-                                               {QualityWord::kDoubtful, "doubtful"},
-                                               {QualityWord::kWrong, "wrong"}};
 
 // Fitted to maps of simulated recordings with and without faults: docs/recordings.md.
 constexpr double kWrongPerExpected = 1.3;  // the probability knows few of the causes
@@ -66,8 +60,6 @@ std::string badKeyframesText(const std::vector<std::size_t>& keyframes) {
 }
 
 }  // namespace
-
-std::string_view nameOf(QualityWord word) { return nameIn(kWords, word); }
 
 void QualityStatistics::add(const KeyframeDepthMap& keyframe, const QualityFacts& facts) {
   const DepthMap& map = keyframe.map;

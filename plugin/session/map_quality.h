@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 
@@ -21,7 +22,12 @@ enum class QualityWord {
   kWrong,     ///< Much of it is wrong.
 };
 
-std::string_view nameOf(QualityWord word);
+template <>
+inline constexpr NamedChoice<QualityWord> kNamesOf<QualityWord>[] = {
+    {QualityWord::kUnknown, "unknown"},
+    {QualityWord::kGood, "good"},
+    {QualityWord::kDoubtful, "doubtful"},
+    {QualityWord::kWrong, "wrong"}};
 
 /// How good a map is, by its own evidence. A depth is wrong if it is off by more than 10 %.
 struct MapQuality {

@@ -142,6 +142,7 @@ void MapperCore::addEvents(int camera, std::vector<Event> events,
     if (!rig_is_fixed_) fixRig(Rig(given_rig_));
     if (queue_) return queue_->add(camera, std::move(events), complete_until_ns);
     EventIntake& intake = intakes_[index];
+    if (pose_times_) intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);
     packet.events = intake.add(std::move(events));
     if (complete_until_ns) {
       packet.complete_until_ns = std::min(*complete_until_ns, intake.waitsSinceNs());
@@ -227,7 +228,7 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
   }
   for (const Warning& warning : warnings()) {
     if (warning.name == "poses-blur" || warning.name == "far-coordinates" ||
-        warning.name == "voxel-size")
+        warning.name == "voxel-size" || warning.name == "skipped-events")
       warn(warning.name + ": " + warning.text, error);
   }
   const MapQuality quality = status().quality;
@@ -250,9 +251,6 @@ void MapperCore::add(Sample sample) {
   if (pose) {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
     extend(pose_times_, pose->t_ns);
-    for (EventIntake& intake : intakes_) {
-      intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);
-    }
   }
   if (queue_) {
     if (packet) queue_->add(std::move(*packet));
@@ -286,6 +284,7 @@ void MapperCore::finish() {
       const std::lock_guard<std::mutex> lock(cameras_mutex_);
       for (EventIntake& intake : intakes_) {
         const auto camera = static_cast<int>(&intake - intakes_.data());
+        if (pose_times_) intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);
         EventPacket& rest = end.packets.emplace_back(QueuedPacket{{camera, intake.finish()}});
         const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
         statistics_.addEvents(rest);

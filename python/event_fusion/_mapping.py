@@ -123,6 +123,8 @@ class Mapper:
             Index that `add_camera` returned.
         array : structured array
             Fields x, y, p (or polarity) and t (or ts, timestamp). Events that are up to 10 ms out of order are sorted.
+            Bursts of events with a time far ahead are left out, and `warnings` tells their number (without
+            ``live.enabled``).
         time_unit : {'ns', 'us', 'ms', 's'}
             Unit of the times.
 

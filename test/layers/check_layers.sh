@@ -30,7 +30,7 @@ front='CLI/|yaml-cpp/'
 forbid mapping "(maps|tracking_stub|plugin|test)/" "may include mapping/ alone"
 forbid mapping "$mrpt|$pcl|$ceres|$recordings|$front" "may use Eigen, OpenCV, oneTBB and Highway"
 forbid mapping "hwy/" "Highway stays in mapping/kernels/" '^mapping/kernels/'
-forbid mapping "png\.h|tiff|zlib" "libpng and libtiff stay in picture_file" '^mapping/base/picture_file\.cpp:'
+forbid mapping "spng\.h|tiff|zlib" "libspng and libtiff stay in picture_file" '^mapping/base/picture_file\.cpp:'
 forbid mapping/kernels "Eigen|opencv2|tbb|oneapi" "may use Highway alone"
 forbid mapping/kernels "mapping/[^k]" "may include mapping/kernels/ alone"
 forbid maps "(tracking_stub|plugin|test)/" "may include mapping/ and maps/"
@@ -45,7 +45,7 @@ for folder in mapping maps tracking_stub plugin; do
     '^plugin/mrpt/CEventFusionMapBuilder\.cpp:'
 done
 for folder in maps tracking_stub plugin; do
-  forbid "$folder" "png\.h|tiff" "libpng and libtiff stay in mapping/base/picture_file"
+  forbid "$folder" "spng\.h|tiff" "libspng and libtiff stay in mapping/base/picture_file"
 done
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
 forbid plugin "$pcl" "PCL stays in maps/ (map_point.h is its header) and cloud_alignment" '^plugin/evaluation/cloud_alignment\.cpp:'

@@ -7,19 +7,12 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/base/named_choice.h"
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<TrackerClass> kClasses[] = {{TrackerClass::kNone, "none"},
-                                                  {TrackerClass::kGood, "good"},
-                                                  {TrackerClass::kTypical, "typical"},
-                                                  {TrackerClass::kPoor, "poor"},
-                                                  {TrackerClass::kCar, "car"}};
 
 /// The time in which the size of errors is stated: the step of the random walk, and travel.
 constexpr double kStepS = 0.2;
@@ -150,10 +143,6 @@ std::int64_t medianStepOf(const std::vector<StampedPose>& poses) {
 }
 
 }  // namespace
-
-std::string_view nameOf(TrackerClass tracker) { return nameIn(kClasses, tracker); }
-
-TrackerClass trackerClassFromName(std::string_view name) { return valueIn(kClasses, name); }
 
 std::vector<StampedPose> withTrackerProcess(const std::vector<StampedPose>& poses,
                                             const TrackerProcessOptions& options,

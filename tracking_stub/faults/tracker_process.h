@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/trajectory.h"
 
@@ -20,9 +21,13 @@ enum class TrackerClass {
   kCar,      ///< Driving, 3 %.
 };
 
-std::string_view nameOf(TrackerClass tracker);
-/// @throws std::invalid_argument if the name is unknown.
-TrackerClass trackerClassFromName(std::string_view name);
+template <>
+inline constexpr NamedChoice<TrackerClass> kNamesOf<TrackerClass>[] = {
+    {TrackerClass::kNone, "none"},
+    {TrackerClass::kGood, "good"},
+    {TrackerClass::kTypical, "typical"},
+    {TrackerClass::kPoor, "poor"},
+    {TrackerClass::kCar, "car"}};
 
 struct TrackerProcessOptions {
   TrackerClass tracker = TrackerClass::kNone;

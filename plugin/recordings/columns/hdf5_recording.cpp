@@ -211,7 +211,7 @@ RigCamera readCalib(const Hdf5File& file, const std::string& group) {
   model = {width, height, k[0], k[1], k[2], k[3], DistortionModel::kNone, {}};
   const std::string distortion = file.text(group + "/distortion_model");
   try {
-    model.distortion = distortionModelFromName(distortion);
+    model.distortion = fromName<DistortionModel>(distortion);
   } catch (const std::invalid_argument&) {
     throw file.fail(group + "/distortion_model",
                     inQuotes(distortion) + ": expected radtan, equidistant or none");

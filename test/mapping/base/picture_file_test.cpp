@@ -59,7 +59,8 @@ std::string png(std::uint32_t width, std::uint32_t height, char bits, char colou
            reinterpret_cast<const Bytef*>(filtered.data()), filtered.size());
   std::string bytes = "\x89PNG\r\n\x1a\n" + chunk("IHDR" + bigEndian(width) + bigEndian(height) +
                                                   bits + colours + std::string(3, '\0'));
-  if (colours == 3) bytes += chunk("PLTE" + std::string("\1\2\3\40\50\60\307\6\5\11\7\3", 12));
+  if (colours == 3)
+    bytes += chunk("PLTE" + std::string("\1\2\3\40\50\60\307\6\5\11\7\3", 3U << bits));
   if (transparent) bytes += chunk("tRNS" + std::string(colours == 2 ? 6 : 2, '\0'));
   return bytes + chunk("IDAT" + packed.substr(0, size)) + chunk("IEND");
 }

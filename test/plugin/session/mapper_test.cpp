@@ -201,6 +201,33 @@ TEST(Mapper, OwnDataMayComeInAnyOrderOfSensors) {
   }
 }
 
+TEST(Mapper, BurstsOfWrongTimesInOwnDataAreLeftOutAndTold) {
+  const SyntheticRecording recording(0.8);
+  const auto expected = mapOf(syntheticOptions(), samplesOf(recording));
+  for (const std::size_t at : {std::size_t{0}, std::size_t{600}, recording.events[0].size()}) {
+    std::vector<Event> events = recording.events[0];
+    const Event& beside = events[std::min(at, events.size() - 1)];
+    for (std::int64_t i = 0; i < 50; ++i) {
+      const std::int64_t t_ns = beside.t_ns + 100'000 * kMsNs + 100'000 * i;
+      events.insert(events.begin() + std::ptrdiff_t(at) + i, {t_ns, 5, 5, true});
+    }
+    Mapper mapper(syntheticOptions());
+    for (const RigCamera& camera : recording.cameras) mapper.addCamera(camera);
+    for (const StampedPose& pose : recording.poses) mapper.addPose(pose);
+    for (std::size_t first = 0; first < events.size(); first += 100) {
+      const auto begin = events.begin() + std::ptrdiff_t(first);
+      mapper.addEvents(
+          0, {begin, begin + std::ptrdiff_t(std::min<std::size_t>(100, events.size() - first))});
+    }
+    mapper.addEvents(1, recording.events[1]);
+    mapper.finish();
+    expectSameMap(*mapper.snapshot(), *expected);
+    ASSERT_EQ(mapper.warnings().size(), 1U) << at;
+    EXPECT_EQ(mapper.warnings()[0].name, "skipped-events");
+    EXPECT_THAT(mapper.warnings()[0].text, testing::StartsWith("50 bad events were left out"));
+  }
+}
+
 TEST(Mapper, OwnDataMayComeFromAThreadPerSensor) {
   const SyntheticRecording recording(0.8);
   const auto expected = mapOf(syntheticOptions(), samplesOf(recording));
