@@ -430,8 +430,8 @@ void requireCameras(const Calibration& given, const RecordingParts& parts) {
 
 void requireGivenFile(const Path& file, const char* option) {
   if (std::filesystem::exists(file)) return requireNoPipe(file);
-  if (!file.empty())
-    throw std::runtime_error(fmt::format("{} {}: no such file", option, file.string()));
+  if (file.empty()) return;
+  throw std::runtime_error(fmt::format("{} {}: no such file", option, file.string()));
 }
 
 }  // namespace
