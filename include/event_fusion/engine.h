@@ -142,8 +142,8 @@ class Mapper {
   /// @throws std::invalid_argument if a value is not valid; std::logic_error after `addEvents`.
   int addCamera(const RigCamera& camera);
   /// Adds the next events of a camera, on the camera's clock. Events that are up to 10 ms out of
-  /// order are sorted. Bursts of events with a time far ahead are left out, and `warnings` tells
-  /// their number. After an error, no event of this call is added.
+  /// order are sorted. In playback bursts of events with a time far ahead are left out, and
+  /// `warnings` tells their number. After an error, no event of this call is added.
   /// @throws std::invalid_argument if an event is outside the sensor or older than that, or if
   /// there is no such camera.
   void addEvents(int camera, std::vector<Event> events);

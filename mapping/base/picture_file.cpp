@@ -17,7 +17,6 @@
 #include <new>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "mapping/base/text.h"
 

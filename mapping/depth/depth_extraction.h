@@ -3,7 +3,6 @@
 
 #include <limits>
 #include <optional>
-#include <string_view>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdint>
-#include <string_view>
 #include <vector>
 
 #include "mapping/base/named_choice.h"

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 
 #include <cstdint>
-#include <string_view>
 #include <vector>
 
 #include "mapping/base/named_choice.h"

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string_view>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"

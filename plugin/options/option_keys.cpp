@@ -8,7 +8,6 @@
 #include <charconv>
 #include <optional>
 #include <stdexcept>
-#include <tuple>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"

@@ -233,8 +233,8 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
   Recording& source = held->source();
-  if (!source.counts().of_calibration.empty()) {  // they are all cameras of the recording
-    job.source.cameras = source.counts().of_calibration;
+  if (std::vector<int> chosen = source.counts().of_calibration; !chosen.empty()) {
+    job.source.cameras = std::move(chosen);  // they are all cameras of the recording
     options.mapper.cameras.clear();
   }
   first.statistics = RecordingStatistics(statisticsOptions(options));
@@ -325,14 +325,13 @@ void MapSteps::write(const std::function<void()>& file) {
 
 void MapSteps::describe(MappingRun& run, bool stopped) {
   run.describe(report, stopped);
-  if (const std::vector<int> cameras = recording->counts().of_calibration; !cameras.empty()) {
-    report.options.mapper.cameras = cameras;
-  }
+  const RecordingCounts counts = recording->counts();
+  if (!counts.of_calibration.empty()) report.options.mapper.cameras = counts.of_calibration;
   report.recording = namesOf(job.source);
   report.faults = job.sourceNow().faults;
   const std::string calibration = options.rig.calibration.string();
   // The recording's own calibration may be the better one. --calibration is intended.
-  if (recording->counts().recalibrated && job.source.calibration.empty()) {
+  if (counts.recalibrated && job.source.calibration.empty()) {
     report.warnings.push_back({"calibration-replaced",
                                calibration + " replaced another calibration, the recording's own; "
                                              "--set rig.calibration= keeps that"});

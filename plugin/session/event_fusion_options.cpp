@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "mapping/base/option.h"
 #include "maps/cloud/keyframe_cloud.h"
@@ -36,6 +37,7 @@ void requireCalibrated(int camera, const CameraModel& model) {
 
 void requireMappable(const Rig& rig, const EventFusionOptions& options) {
   const auto count = static_cast<int>(rig.cameras.size());
+  if (count == 0) throw std::invalid_argument("there are no cameras: expected at least one");
   for (int i = 0; i < count; ++i) {
     const RigCamera& camera = rig.cameras[static_cast<std::size_t>(i)];
     requireCalibrated(i, camera.model);

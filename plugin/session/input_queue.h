@@ -50,7 +50,8 @@ class EventBudget {
   std::uint64_t subsampled_ = 0;
 };
 
-/// A packet in the queue. In place of a packet that is not to be mapped, one without events.
+/// A packet in the queue: its late events are left out where the session takes it. In place of a
+/// packet that is not to be mapped, one without events.
 struct QueuedPacket : EventPacket {
   /// End of the events that the host left out, on the camera's clock.
   std::optional<std::int64_t> skipped_until_ns = std::nullopt;

@@ -139,7 +139,7 @@ void MapperCore::addEvents(int camera, std::vector<Event> events,
           fmt::format("events of camera {}: there are {} cameras: expected a camera that was added",
                       camera, given_rig_.cameras.size()));
     }
-    if (!rig_is_fixed_) fixRig(Rig(given_rig_));
+    if (!rig_is_fixed_) fixRig(given_rig_);
     if (queue_) return queue_->add(camera, std::move(events), complete_until_ns);
     EventIntake& intake = intakes_[index];
     if (pose_times_) intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);

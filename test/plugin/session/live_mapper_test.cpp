@@ -197,34 +197,32 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
 
 TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
   const SyntheticRecording recording(3);
-  {
-    EventFusionOptions options = live();
-    options.automatic = defaultOptions().automatic;
-    options.live.max_queue_events = 1000;
-    MapperOfRig mapper(options);
-    play(mapper, samplesOf(recording));
+  EventFusionOptions options = live();
+  options.automatic = defaultOptions().automatic;
+  options.live.max_queue_events = 1000;
+  MapperOfRig mapper(options);
+  play(mapper, samplesOf(recording));
 
-    const SessionStatus status = mapper.status();
-    expectSumsAgree(status);
-    ASSERT_EQ(status.chosen.size(), 5U);
-    const auto window = std::find_if(status.chosen.begin(), status.chosen.end(),
-                                     [](const auto& option) { return option.key == "window_s"; });
-    ASSERT_NE(window, status.chosen.end());
-    const std::string reason = window->reason;
-    ASSERT_THAT(reason, testing::StartsWith("no longer one fits into half of the queue of live "
-                                            "operation; from "));
-    const double length_s = std::stod(reason.substr(reason.find("from ") + 5));
-    const double begin_s = std::stod(reason.substr(reason.find(" at ") + 4)) -
-                           1e-9 * static_cast<double>(SyntheticRecording::kStartNs);
-    const double events =
-        static_cast<double>(pieceOf(recording, 0, begin_s, begin_s + length_s).events.size() +
-                            pieceOf(recording, 1, begin_s, begin_s + length_s).events.size());
-    EXPECT_NEAR(window->value * events / length_s, 500, 10) << reason;
-    EXPECT_GT(mapper.points()->size(), 30U);
-    EXPECT_GT(static_cast<double>(mapper.snapshot()->trajectory.size()), 2.7 / window->value);
-    EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
-    EXPECT_EQ(status.live->dropRatio(), 0);
-  }
+  const SessionStatus status = mapper.status();
+  expectSumsAgree(status);
+  ASSERT_EQ(status.chosen.size(), 5U);
+  const auto window = std::find_if(status.chosen.begin(), status.chosen.end(),
+                                   [](const auto& option) { return option.key == "window_s"; });
+  ASSERT_NE(window, status.chosen.end());
+  const std::string reason = window->reason;
+  ASSERT_THAT(reason, testing::StartsWith("no longer one fits into half of the queue of live "
+                                          "operation; from "));
+  const double length_s = std::stod(reason.substr(reason.find("from ") + 5));
+  const double begin_s = std::stod(reason.substr(reason.find(" at ") + 4)) -
+                         1e-9 * static_cast<double>(SyntheticRecording::kStartNs);
+  const double events =
+      static_cast<double>(pieceOf(recording, 0, begin_s, begin_s + length_s).events.size() +
+                          pieceOf(recording, 1, begin_s, begin_s + length_s).events.size());
+  EXPECT_NEAR(window->value * events / length_s, 500, 10) << reason;
+  EXPECT_GT(mapper.points()->size(), 30U);
+  EXPECT_GT(static_cast<double>(mapper.snapshot()->trajectory.size()), 2.7 / window->value);
+  EXPECT_EQ(status.counts.dropped_windows.total(), 0U) << asText(status.counts.dropped_windows);
+  EXPECT_EQ(status.live->dropRatio(), 0);
 }
 
 TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnError) {
