@@ -149,7 +149,9 @@ class Mapper {
   void addEvents(int camera, std::vector<Event> events);
   /// Adds the next pose, on the clock of the poses; the rotation is normalised. The pose is rounded
   /// as the poses of recordings are (time to 100 ns, rotation to 1e-12 rad), so that the same poses
-  /// make the same map in every way. Of two poses of the same time the first one is used.
+  /// make the same map in every way. Of two poses of the same time the first one is used. A burst
+  /// of poses that are over a second ahead is left out (warning `skipped-poses`; in live operation
+  /// they count as rejected).
   /// @param noise standard deviations that the tracker states, for the refinement.
   /// @throws std::invalid_argument if the pose is not finite, or a second older than the newest
   /// one.

@@ -7,14 +7,10 @@
 namespace efm {
 namespace {
 
-// Longer than bursts of wrong times: a time word of a sensor (EVT 3) counts for 4.1 ms.
-constexpr std::int64_t kConfirmingNs = 20'000'000;
 constexpr std::size_t kMaxRuns = 512;
 constexpr std::size_t kMaxWaiting = 1'000'000;
 
 }  // namespace
-
-bool EventChecker::Run::isConfirmed() const { return max_ns - min_ns >= kConfirmingNs; }
 
 bool EventChecker::arePosesNear(const Run& run) const {
   return poses_ns_ && run.min_ns >= poses_ns_->first - kNanosecondsPerSecond &&
@@ -29,9 +25,9 @@ std::int64_t EventChecker::waitsSinceNs() const {
 
 EventChecker::Verdict EventChecker::add(const Event& event, std::uint64_t number) {
   const std::int64_t t_ns = event.t_ns;
-  if (t_ns < newest_ns_ - kMaxEventDelayNs) return Verdict::kLate;
-  const bool follows = !runs_.empty() && t_ns >= runs_.back().max_ns - kMaxEventDelayNs &&
-                       t_ns <= runs_.back().max_ns + kMaxEventDelayNs;
+  if (t_ns < newest_ns_ - limits_.pause_ns) return Verdict::kLate;
+  const bool follows = !runs_.empty() && t_ns >= runs_.back().max_ns - limits_.pause_ns &&
+                       t_ns <= runs_.back().max_ns + limits_.pause_ns;
   if (!follows) {
     runs_.push_back({waiting_.size(), 0, t_ns, t_ns, number, lastNs()});
   }
@@ -40,7 +36,7 @@ EventChecker::Verdict EventChecker::add(const Event& event, std::uint64_t number
   run.end = waiting_.size();
   run.min_ns = std::min(run.min_ns, t_ns);
   run.max_ns = std::max(run.max_ns, t_ns);
-  if (run.isConfirmed()) {
+  if (run.max_ns - run.min_ns >= limits_.confirming_ns) {
     settle(Settle::kToConfirmed);
   } else if (runs_.size() == kMaxRuns || waiting_.size() == kMaxWaiting) {
     settle(Settle::kToMiddle);
@@ -55,11 +51,11 @@ std::vector<std::size_t> EventChecker::longestChain(bool ends_with_last) const {
   std::vector<std::size_t> events(runs_.size()), before(runs_.size(), kNone);
   std::size_t last = kNone;
   for (std::size_t b = 0; b < runs_.size(); ++b) {
-    const bool late = runs_[b].min_ns < newest_ns_ - kMaxEventDelayNs;
+    const bool late = runs_[b].min_ns < newest_ns_ - limits_.pause_ns;
     if (runs_[b].wrong || late) continue;
     std::size_t most = 0;
     for (std::size_t a = 0; a < b; ++a) {
-      const bool in_order = runs_[b].min_ns >= runs_[a].max_ns - kMaxEventDelayNs;
+      const bool in_order = runs_[b].min_ns >= runs_[a].max_ns - limits_.pause_ns;
       if (events[a] == 0 || !in_order || events[a] < most) continue;
       most = events[a];
       before[b] = a;
@@ -81,7 +77,7 @@ bool EventChecker::rejectLoose(const std::vector<std::size_t>& chain, bool at_en
     for (std::size_t i = first; i <= last; ++i) {
       if (arePosesNear(runs_[chain[i]])) return true;
     }
-    return runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= kConfirmingNs;
+    return runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= limits_.confirming_ns;
   };
   const auto is_long = [&](std::int64_t from_ns, std::size_t to) {
     return runs_[chain[to]].min_ns - from_ns > kMaxLastPauseNs;

@@ -25,8 +25,16 @@ namespace efm {
 /// as many of them as possible; the rest is wrong. The first and the last events of a stream are
 /// wrong if a pause of over 10 s divides them from the others, they last less than 20 ms, and no
 /// pose is near. At most a million events wait (16 MB).
+///
+/// Poses have the same rule with other limits, see `PoseIntake`.
 class EventChecker {
  public:
+  struct Limits {
+    std::int64_t pause_ns = kMaxEventDelayNs;  ///< A longer step ahead begins a pause.
+    /// A stream must go on for this long behind a pause: longer than bursts of wrong times. A time
+    /// word of a sensor (EVT 3) counts for 4.1 ms.
+    std::int64_t confirming_ns = 20'000'000;
+  };
   /// An event whose waiting has ended.
   struct Settled {
     Event event;
@@ -36,6 +44,9 @@ class EventChecker {
   };
   enum class Verdict { kBeginsRun, kWaits, kLate };
 
+  EventChecker() = default;
+  explicit EventChecker(const Limits& limits) : limits_(limits) {}
+
   /// Poses from `first_ns` to `last_ns`, on the camera's clock, confirm the first and the last
   /// events.
   void expectPoses(std::int64_t first_ns, std::int64_t last_ns) { poses_ns_ = {first_ns, last_ns}; }
@@ -43,7 +54,7 @@ class EventChecker {
   /// Adds an event if it follows the newest one at once, and nothing waits. @return whether it did.
   bool pass(const Event& event) {
     const bool near =
-        event.t_ns >= newest_ns_ - kMaxEventDelayNs && event.t_ns <= newest_ns_ + kMaxEventDelayNs;
+        event.t_ns >= newest_ns_ - limits_.pause_ns && event.t_ns <= newest_ns_ + limits_.pause_ns;
     if (!near || !waiting_.empty()) return false;
     newest_ns_ = std::max(newest_ns_, event.t_ns);
     return true;
@@ -56,11 +67,17 @@ class EventChecker {
   /// Ends the waiting. @param at_end false if the stream is damaged: the last events are right
   /// then.
   void finish(bool at_end) { settle(at_end ? Settle::kAtEnd : Settle::kAtDamage); }
+  /// Ends the waiting, because the last event is known to be right.
+  void confirmLast() { settle(Settle::kToConfirmed); }
+  /// Continues at this time: the clock may have gone back.
+  void follow(std::int64_t t_ns) { newest_ns_ = t_ns; }
 
   /// Returns the newest time of the events that are known to be right.
   std::int64_t newestNs() const { return newest_ns_; }
   /// Returns the earliest time of the events that wait; kMaxTimeNs if there is none.
   std::int64_t waitsSinceNs() const;
+  /// Returns the earliest time of the events that wait behind the last pause; kMaxTimeNs: none.
+  std::int64_t lastRunSinceNs() const { return runs_.empty() ? kMaxTimeNs : runs_.back().min_ns; }
   /// Returns the newest time of the last events, also if they wait.
   std::int64_t lastNs() const { return runs_.empty() ? newest_ns_ : runs_.back().max_ns; }
 
@@ -72,8 +89,6 @@ class EventChecker {
     std::uint64_t first = 0;     // as in Settled
     std::int64_t before_ns = 0;  // as in Settled
     bool wrong = false;
-
-    bool isConfirmed() const;
   };
   enum class Settle { kToConfirmed, kToMiddle, kAtEnd, kAtDamage };
 
@@ -82,6 +97,7 @@ class EventChecker {
   bool rejectLoose(const std::vector<std::size_t>& chain, bool at_end);
   void settle(Settle how);
 
+  Limits limits_;
   std::optional<std::pair<std::int64_t, std::int64_t>> poses_ns_;
   std::int64_t newest_ns_ = -kEndOfTimeNs;
   std::vector<Event> waiting_;
@@ -108,6 +124,7 @@ class EventIntake {
   /// Ends the waiting.
   CheckedEvents finish();
 
+  std::int64_t offsetNs() const { return calibration_.time_offset_ns; }
   /// Returns the time of the first event that waits; kMaxTimeNs if there is none.
   std::int64_t waitsSinceNs() const { return checker_.waitsSinceNs(); }
   /// Returns the number of events with a wrong time, and what is wrong with the first.

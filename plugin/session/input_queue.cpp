@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -72,26 +73,19 @@ void EventBudget::endInterval(std::vector<Event>& passed) {
   held_.clear();
 }
 
-template <typename Input>
-void InputQueue::Stream<Input>::follow(std::int64_t t_ns) {
+void InputQueue::Stream::follow(std::int64_t t_ns) {
   if (!reached_ns || t_ns > *reached_ns || isFarAfter(*reached_ns, t_ns)) reached_ns = t_ns;
 }
 
-template <typename Input>
-std::optional<Input> InputQueue::Stream<Input>::finalize(bool is_right, std::uint64_t& rejected) {
-  std::optional<Input> waited = std::exchange(ahead, std::nullopt);
+std::optional<Event> InputQueue::Stream::finalize(bool is_right, std::uint64_t& rejected) {
+  std::optional<Event> waited = std::exchange(ahead, std::nullopt);
   if (!waited) return std::nullopt;
   if (!is_right) {
     ++rejected;
     return std::nullopt;
   }
-  follow(ahead_ns);
+  follow(waited->t_ns);
   return waited;
-}
-
-template <typename Input>
-std::optional<Input> InputQueue::Stream<Input>::finalizeLast(std::uint64_t& rejected) {
-  return finalize(reached_ns && !isFarAfter(ahead_ns, *reached_ns, kMaxLastPauseNs), rejected);
 }
 
 InputQueue::InputQueue(const LiveOptions& options) : options_(options) {}
@@ -134,6 +128,10 @@ void InputQueue::take(int index, std::vector<Event> events,
     return;
   }
   takeAhead(index, events, complete_until_ns);
+  if (camera.stream.reached_ns && std::size_t(index) < rig_.cameras.size()) {
+    const std::int64_t offset_ns = rig_.cameras[static_cast<std::size_t>(index)].time_offset_ns;
+    pushPoses(pose_intake_.noteEvents(trajectoryTime(*camera.stream.reached_ns, offset_ns)));
+  }
   pass(index, std::move(events), complete_until_ns);
 }
 
@@ -150,10 +148,10 @@ void InputQueue::pass(int index, std::vector<Event> events,
 void InputQueue::takeAhead(int index, std::vector<Event>& events,
                            std::optional<std::int64_t>& complete_until_ns) {
   Camera& camera = cameraOf(index);
-  Stream<Event>& stream = camera.stream;
+  Stream& stream = camera.stream;
   const std::optional<std::int64_t> begin_ns =
       events.empty() ? complete_until_ns : std::optional(events.front().t_ns);
-  const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
+  const bool confirms = begin_ns && stream.ahead && !isFarAfter(stream.ahead->t_ns, *begin_ns);
   if (confirms || !events.empty()) {  // `complete_until_ns` alone rejects nothing
     if (auto waited = stream.finalize(confirms, camera.counts.fates[EventFate::kRejected])) {
       pass(index, {*waited}, std::nullopt);
@@ -165,7 +163,6 @@ void InputQueue::takeAhead(int index, std::vector<Event>& events,
     if (stream.reached_ns && isFarAfter(event.t_ns, *stream.reached_ns)) {
       if (i + 1 == events.size()) {
         stream.ahead = event;
-        stream.ahead_ns = event.t_ns;
         if (complete_until_ns) {  // the packet may end with this event
           complete_until_ns = std::min(*complete_until_ns, *stream.reached_ns);
         }
@@ -230,18 +227,12 @@ void InputQueue::add(PoseSample pose) {
     ++rejected_poses_;
     return;
   }
-  Stream<PoseSample>& stream = pose_streams_[pose.source];
-  const std::int64_t t_ns = pose.t_ns;
-  if (auto waited = stream.finalize(!isFarAfter(stream.ahead_ns, t_ns), rejected_poses_)) {
-    poses_.push_back(std::move(*waited));
-  }
-  if (stream.reached_ns && isFarAfter(t_ns, *stream.reached_ns)) {
-    stream.ahead = std::move(pose);
-    stream.ahead_ns = t_ns;
-  } else {
-    stream.follow(t_ns);
-    poses_.push_back(std::move(pose));
-  }
+  pushPoses(pose_intake_.add(std::move(pose)));
+}
+
+void InputQueue::pushPoses(std::vector<PoseSample> poses) {
+  if (poses.empty()) return;
+  std::move(poses.begin(), poses.end(), std::back_inserter(poses_));
   changed_.notify_one();
 }
 
@@ -250,16 +241,17 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
-    if (auto last = camera.stream.finalizeLast(camera.counts.fates[EventFate::kRejected])) {
+    const std::optional<std::int64_t>& reached_ns = camera.stream.reached_ns;
+    const bool is_right = reached_ns && camera.stream.ahead &&
+                          !isFarAfter(camera.stream.ahead->t_ns, *reached_ns, kMaxLastPauseNs);
+    if (auto last = camera.stream.finalize(is_right, camera.counts.fates[EventFate::kRejected])) {
       pass(index, {*last}, std::nullopt);
     }
     std::vector<Event> rest = camera.budget.finish();
     if (rest.empty()) continue;
     push({{index, CheckedEvents(std::move(rest)), camera.complete_until_ns}});
   }
-  for (auto& [source, stream] : pose_streams_) {
-    if (auto last = stream.finalizeLast(rejected_poses_)) poses_.push_back(std::move(*last));
-  }
+  pushPoses(pose_intake_.finish());
   changed_.notify_one();
 }
 
@@ -314,7 +306,7 @@ std::uint64_t InputQueue::queuedEvents() const {
 
 std::uint64_t InputQueue::rejectedPoses() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return rejected_poses_;
+  return rejected_poses_ + pose_intake_.wrongPoses();
 }
 
 std::map<int, QueueCounts> InputQueue::counts() const {

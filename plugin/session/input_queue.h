@@ -14,6 +14,7 @@
 #include "mapping/events/event.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/mapping_session.h"
+#include "plugin/session/pose_intake.h"
 
 namespace efm {
 
@@ -64,8 +65,8 @@ QueuedPacket skippedPacket(int camera, const std::vector<Event>& events);
 /// If the queue is full, its oldest packets are dropped, but never poses. Any thread adds; one
 /// thread takes. Adding never waits for the mapping.
 ///
-/// An event or pose that is over a second ahead of its stream waits for the next one of its stream.
-/// If the next one is back at the former time, only the event or pose that was ahead is rejected.
+/// An event that is over a second ahead of its stream waits for the next one. If the next one is
+/// back at the former time, only the event that was ahead is rejected. Poses: see `PoseIntake`.
 class InputQueue {
  public:
   explicit InputQueue(const LiveOptions& options);
@@ -102,31 +103,27 @@ class InputQueue {
 
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
-  /// Returns the number of poses that came after the end, or were far ahead of their source.
+  /// Returns the number of poses that came after the end, or have a wrong time.
   std::uint64_t rejectedPoses() const;
 
  private:
-  /// Progress of a stream of input.
-  template <typename Input>
+  /// Progress of a camera's events.
   struct Stream {
     std::optional<std::int64_t> reached_ns;  // newest time that is not ahead
-    std::optional<Input> ahead;              // waits until the next input confirms its time
-    std::int64_t ahead_ns = 0;
+    std::optional<Event> ahead;              // waits until the next event confirms its time
 
     /// Takes a new time. The clock may go back.
     void follow(std::int64_t t_ns);
-    /// Ends the wait of the input `ahead` and returns it if its time is right. Otherwise adds 1 to
+    /// Ends the wait of the event `ahead` and returns it if its time is right. Otherwise adds 1 to
     /// `rejected` and returns std::nullopt.
-    std::optional<Input> finalize(bool is_right, std::uint64_t& rejected);
-    /// Ends the wait at the end of the input.
-    std::optional<Input> finalizeLast(std::uint64_t& rejected);
+    std::optional<Event> finalize(bool is_right, std::uint64_t& rejected);
   };
 
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
     std::optional<std::int64_t> complete_until_ns;  // of the last packet
-    Stream<Event> stream;  // of events and `complete_until_ns`; one event may wait
+    Stream stream;  // of events and `complete_until_ns`; one event may wait
     QueueCounts counts;
   };
 
@@ -136,6 +133,7 @@ class InputQueue {
                  std::optional<std::int64_t>& complete_until_ns);
   void pass(int index, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
   void push(QueuedPacket packet);
+  void pushPoses(std::vector<PoseSample> poses);
   void dropOldest();
   bool isFull() const;
   Batch takeLocked(bool all_mapped);
@@ -149,8 +147,8 @@ class InputQueue {
   std::map<int, Camera> cameras_;
   std::deque<QueuedPacket> packets_;
   std::vector<PoseSample> poses_;
-  std::map<PoseSourceId, Stream<PoseSample>> pose_streams_;
-  std::uint64_t rejected_poses_ = 0;
+  PoseIntake pose_intake_;
+  std::uint64_t rejected_poses_ = 0;  // after the end
   std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_
   std::uint64_t bytes_ = 0;

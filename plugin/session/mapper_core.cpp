@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/pose_conflict.h"
 #include "plugin/session/health_checks.h"
 
 namespace efm {
@@ -132,6 +133,7 @@ void MapperCore::addEvents(int camera, std::vector<Event> events,
                            std::optional<std::int64_t> complete_until_ns) {
   const auto index = static_cast<std::size_t>(camera);
   EventPacket packet{camera, {}, complete_until_ns};
+  Batch batch;
   {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
     if (index >= given_rig_.cameras.size()) {
@@ -147,12 +149,24 @@ void MapperCore::addEvents(int camera, std::vector<Event> events,
     if (complete_until_ns) {
       packet.complete_until_ns = std::min(*complete_until_ns, intake.waitsSinceNs());
     }
+    noteEvents(packet, batch);
     const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
     statistics_.addEvents(packet);
   }
-  Batch batch;
   batch.packets.push_back({std::move(packet)});
   workHere(std::move(batch));
+}
+
+/// Adds the poses to the batch that the events of a packet confirm.
+void MapperCore::noteEvents(const EventPacket& packet, Batch& batch) {
+  if (packet.events.empty()) return;
+  const std::int64_t offset_ns = intakes_[static_cast<std::size_t>(packet.camera)].offsetNs();
+  addRight(pose_intake_.noteEvents(trajectoryTime(packet.events.back().t_ns, offset_ns)), batch);
+}
+
+void MapperCore::addRight(std::vector<PoseSample> poses, Batch& batch) {
+  for (const PoseSample& pose : poses) extend(pose_times_, pose.t_ns);
+  batch.poses = std::move(poses);
 }
 
 std::vector<Warning> MapperCore::warnings() {
@@ -176,6 +190,10 @@ std::vector<Warning> MapperCore::warnings() {
     for (const EventIntake& intake : intakes_) {
       if (findings.read.first_skipped.empty()) findings.read.first_skipped = intake.firstWrong();
       findings.read.skipped_events += intake.wrongEvents();
+    }
+    if (pose_intake_.wrongPoses() > 0) {
+      findings.read.warnings.push_back(
+          skippedPoses(pose_intake_.wrongPoses(), pose_intake_.firstWrong()));
     }
   }
   findings.use(options.keyframe.planes, state.chosen);
@@ -228,7 +246,8 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
   }
   for (const Warning& warning : warnings()) {
     if (warning.name == "poses-blur" || warning.name == "far-coordinates" ||
-        warning.name == "voxel-size" || warning.name == "skipped-events")
+        warning.name == "voxel-size" || warning.name == "skipped-events" ||
+        warning.name == "skipped-poses")
       warn(warning.name + ": " + warning.text, error);
   }
   const MapQuality quality = status().quality;
@@ -240,26 +259,26 @@ void MapperCore::noteEnd(std::exception_ptr& error) {
 void MapperCore::add(Sample sample) {
   auto* const packet = std::get_if<EventPacket>(&sample);
   auto* const pose = std::get_if<PoseSample>(&sample);
+  Batch batch;
   if (packet) {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
     if (!rig_is_fixed_ || std::size_t(packet->camera) >= given_rig_.cameras.size()) {
       throw std::invalid_argument(fmt::format(
           "a packet of camera {}: expected addCameras(recording.rig()) before it", packet->camera));
     }
+    if (!queue_) noteEvents(*packet, batch);
   }
   if (pose && setup_->T_body_rig) pose->T_body_rig = *setup_->T_body_rig;
-  if (pose) {
+  if (pose && !queue_) {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);
-    extend(pose_times_, pose->t_ns);
+    addRight(pose_intake_.add(std::move(*pose)), batch);
   }
   if (queue_) {
     if (packet) queue_->add(std::move(*packet));
     if (pose) queue_->add(std::move(*pose));
     return;
   }
-  Batch batch;
   if (packet) batch.packets.push_back({std::move(*packet)});
-  if (pose) batch.poses.push_back(std::move(*pose));
   workHere(std::move(batch));
 }
 
@@ -282,6 +301,7 @@ void MapperCore::finish() {
     end.ended = true;
     {
       const std::lock_guard<std::mutex> lock(cameras_mutex_);
+      addRight(pose_intake_.finish(), end);
       for (EventIntake& intake : intakes_) {
         const auto camera = static_cast<int>(&intake - intakes_.data());
         if (pose_times_) intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);

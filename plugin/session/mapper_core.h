@@ -27,6 +27,7 @@
 #include "plugin/session/health_checks.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
+#include "plugin/session/pose_intake.h"
 #include "plugin/session/recording_statistics.h"
 
 namespace efm {
@@ -121,6 +122,8 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   void noteEnd(std::exception_ptr& error);
   void workHere(Batch batch);
   void fixRig(const Rig& given);
+  void noteEvents(const EventPacket& packet, Batch& batch);
+  void addRight(std::vector<PoseSample> poses, Batch& batch);
   void run();
   bool runOnce();
   void feed(Batch batch, std::exception_ptr& error);
@@ -147,9 +150,10 @@ class MapperCore : public std::enable_shared_from_this<MapperCore> {
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;
-  mutable std::mutex cameras_mutex_;       // guards the four members below
+  mutable std::mutex cameras_mutex_;       // guards the five members below
   Rig given_rig_;                          // as the host gave it
   std::vector<EventIntake> intakes_;       // one per camera, in playback
+  PoseIntake pose_intake_;                 // as intakes_
   std::optional<TimeSpan> pose_times_;     // which confirm events
   bool rig_is_fixed_ = false;              // the session knows the cameras
   mutable std::mutex statistics_mutex_;    // guards statistics_; held for copies only

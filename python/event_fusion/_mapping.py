@@ -141,6 +141,8 @@ class Mapper:
     def add_pose(self, t: float, T_world_rig: npt.ArrayLike, time_unit: str = "ns") -> None:
         """Add the next pose, on the clock of the events. Events and poses may come in any order.
 
+        A burst of poses that are over a second ahead is left out, with a warning.
+
         Parameters
         ----------
         t : int or float

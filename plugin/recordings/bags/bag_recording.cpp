@@ -449,7 +449,8 @@ void takeJoined(const Frames& tree, const std::string& camera, FramedPoses poses
     }
   }
   if (!way.empty()) {
-    for (auto& transform : tree().along(way)) poses.chain.push_back(std::move(transform));
+    for (auto& transform : tree().along(way, parts.warnings))
+      poses.chain.push_back(std::move(transform));
     if (parts.poses_damage.empty()) parts.poses_damage = tree().damage();
   }
   std::uint64_t left_out;
@@ -477,7 +478,7 @@ void addPosesOfFrames(const Frames& frames, const std::string& camera, const std
           "poses of {} in the camera's frame: expected the camera's poses, --topics \"{}:{}\"",
           way.back(), topic, fmt::join(way.rbegin(), way.rend(), "->")));
     }
-    FramedPoses poses = {option, tree.along(way), {way.front(), way.back()}};
+    FramedPoses poses = {option, tree.along(way, parts.warnings), {way.front(), way.back()}};
     parts.poses_damage = tree.damage();
     if (std::all_of(poses.chain.begin(), poses.chain.end(),
                     [](const auto& transform) { return transform.size() == 1; })) {
@@ -560,8 +561,9 @@ void addCameraFrames(const RosTopics& cameras, const Frames& tree, RecordingPart
     frame.name = frameOf(camera);
     const std::string& first = parts.camera_frames.front().name;
     if (frame.name.empty() || frame.name == first) continue;
+    std::vector<Warning> ignored;  // a constant transform has no times
     try {
-      const FrameChain chain = tree().along(tree().way(first, frame.name));
+      const FrameChain chain = tree().along(tree().way(first, frame.name), ignored);
       Rigid3 T_cam0_cam;
       bool constant = !chain.empty();
       for (const auto& transform : chain) {

@@ -162,7 +162,7 @@ FrameTree::Way FrameTree::wayThrough(const std::string& frames) const {
                   fmt::join(names, ", ")));
 }
 
-FrameChain FrameTree::along(const Way& way) const {
+FrameChain FrameTree::along(const Way& way, std::vector<Warning>& warnings) const {
   std::map<Pair, std::vector<StampedPose>> moving;
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i + 1 < way.size(); ++i) {
@@ -181,8 +181,10 @@ FrameChain FrameTree::along(const Way& way) const {
     if (found != moving.end()) found->second.push_back({transform.t_ns, rigidAt(transform)});
   };
   if (!moving.empty()) read_(take);
-  for (const auto& [pair, poses] : moving) {
-    requireOneTrajectory(poses, fmt::format("the transform {}->{}", pair.first, pair.second), true);
+  for (auto& [pair, poses] : moving) {
+    auto warning = takeOneTrajectory(
+        poses, fmt::format("the transform {}->{}", pair.first, pair.second), true);
+    if (warning) warnings.push_back(std::move(*warning));
   }
   FrameChain chain;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -46,10 +46,10 @@ class FrameTree {
   /// transform of just these two, if there is one, else as in `way`.
   /// @throws std::runtime_error for unknown or unconnected frames; it lists all transforms.
   Way wayThrough(const std::string& frames) const;
-  /// Returns the transforms along a way.
+  /// Returns the transforms along a way, without those with wrong times: see `findWrongTimes`.
   /// @throws std::runtime_error for wrong numbers, a constant transform with several values, and
   /// two publishers of a moving one.
-  FrameChain along(const Way& way) const;
+  FrameChain along(const Way& way, std::vector<Warning>& warnings) const;
 
   /// Returns whether a transform gives the pose of another frame in this one.
   bool hasBelow(const std::string& frame) const {

@@ -71,7 +71,7 @@ RecordingParts openEvimo2(const std::vector<fs::path>& folders, const ReaderOpti
   for (const fs::path& folder : folders) {
     parts.cameras.push_back(eventsOf(folder, options));
     if (parts.poses.empty() && isFile(folder / "poses.txt")) {
-      parts.poses = readPoseText(folder / "poses.txt", options, &parts.notes);
+      parts.poses = readPoseText(folder / "poses.txt", options, parts);
     }
   }
   const fs::path info = folders.front() / "dataset_info.npz";

@@ -252,15 +252,29 @@ void addGivenPoses(const RecordingSource& source, bool has_hand_eye, RecordingPa
   moveAll(given.notes, parts.notes);
 }
 
+/// Leaves out the poses with wrong times of each source.
 /// @throws std::runtime_error for poses of a source that are not one trajectory.
-void requireOneTrajectoryEach(const RecordingParts& parts, const RecordingSource& source) {
+void takeOneTrajectoryEach(RecordingParts& parts, const RecordingSource& source) {
   const std::string name = sourceNames(source.files);
-  requireOneTrajectory(parts.poses, name);
-  std::map<PoseSourceId, std::vector<StampedPose>> by_source;
-  for (const PoseSample& pose : parts.pose_samples) {
-    by_source[pose.source].push_back({pose.t_ns, pose.T_world_rig()});
+  const auto take = [&](std::vector<StampedPose>& poses, const std::string& of) {
+    if (auto warning = takeOneTrajectory(poses, of)) parts.warnings.push_back(std::move(*warning));
+  };
+  take(parts.poses, name);
+  std::map<PoseSourceId, std::pair<std::vector<StampedPose>, std::vector<std::size_t>>> by_source;
+  for (std::size_t i = 0; i < parts.pose_samples.size(); ++i) {
+    const PoseSample& pose = parts.pose_samples[i];
+    auto& [poses, indices] = by_source[pose.source];
+    poses.push_back({pose.t_ns, pose.T_world_rig()});
+    indices.push_back(i);
   }
-  for (const auto& [id, poses] : by_source) requireOneTrajectory(poses, name + ": " + asText(id));
+  std::vector<std::size_t> wrong;
+  for (auto& [id, of_source] : by_source) {
+    auto& [poses, indices] = of_source;
+    for (const std::size_t i : findWrongTimes(poses)) wrong.push_back(indices[i]);
+    take(poses, name + ": " + asText(id));
+  }
+  std::sort(wrong.begin(), wrong.end());
+  removeAt(wrong, parts.pose_samples);
 }
 
 /// Compares the cameras' poses on the rig with the transforms of a bag.
@@ -458,7 +472,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   RecordingParts parts = openParts(source, has_hand_eye);
   takeFilesOfFolder(source, parts);
   if (source.poses.empty()) {
-    requireOneTrajectoryEach(parts, source);
+    takeOneTrajectoryEach(parts, source);
   } else {
     addGivenPoses(source, has_hand_eye, parts);
   }

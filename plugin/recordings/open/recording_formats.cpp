@@ -247,7 +247,9 @@ RecordingParts posesOfRecording(const fs::path& file, ReaderOptions options) {
   options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
   if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
-  requireOneTrajectory(parts.poses, file.string());
+  if (auto warning = takeOneTrajectory(parts.poses, file.string())) {
+    parts.warnings.push_back(std::move(*warning));
+  }
   if (!parts.poses.empty()) return parts;
   throw std::runtime_error(
       fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));
@@ -270,9 +272,9 @@ RecordingParts readAnyPoses(const fs::path& file, const ReaderOptions& options) 
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
   rejectUnread(file);
   if (trimmed(start).substr(0, 1) == "{") {
-    parts.poses = readPoseFrames(file, options);
+    parts.poses = readPoseFrames(file, options, parts);
   } else {
-    parts.poses = readPoseText(file, options, &parts.notes);
+    parts.poses = readPoseText(file, options, parts);
   }
   return parts;
 }

@@ -4,13 +4,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
+#include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 namespace {
+
+/// Metres and radians together: the motion of a point at 1 m.
+double distanceBetween(const Rigid3& a, const Rigid3& b) {
+  return (a.translation - b.translation).norm() + a.rotation.angularDistance(b.rotation);
+}
 
 /// Finds a conflict of the poses of an interval. @param order indices in the order of time.
 std::optional<PoseConflict> conflictIn(const std::vector<StampedPose>& poses,
@@ -30,6 +40,60 @@ std::optional<PoseConflict> conflictIn(const std::vector<StampedPose>& poses,
     if (poses[i].t_ns < poses[i - 1].t_ns) conflict.back = i;
   }
   return conflict;
+}
+
+/// Returns which poses belong to the longest sequence whose times do not go back.
+std::vector<bool> longestInOrder(const std::vector<StampedPose>& poses) {
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> last;  // at k: the last pose of the sequence of k + 1 that ends earliest
+  std::vector<std::size_t> before(poses.size(), kNone);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto longer = std::partition_point(
+        last.begin(), last.end(), [&](std::size_t k) { return poses[k].t_ns <= poses[i].t_ns; });
+    if (longer != last.begin()) before[i] = *std::prev(longer);
+    if (longer == last.end()) {
+      last.push_back(i);
+    } else {
+      *longer = i;
+    }
+  }
+  std::vector<bool> in_order(poses.size(), false);
+  for (std::size_t i = last.empty() ? kNone : last.back(); i != kNone; i = before[i]) {
+    in_order[i] = true;
+  }
+  return in_order;
+}
+
+using Poses = std::vector<StampedPose>::const_iterator;
+
+/// Returns whether the times leap at both ends of a burst, in one direction and back. At one end
+/// alone the clock was set anew there.
+bool leapsAndReturns(const std::vector<StampedPose>& poses, std::size_t begin, std::size_t end) {
+  if (begin == 0 || end == poses.size()) return true;
+  const std::int64_t there_ns = poses[begin].t_ns - poses[begin - 1].t_ns;
+  const std::int64_t back_ns = poses[end].t_ns - poses[end - 1].t_ns;
+  if ((there_ns > 0) == (back_ns > 0)) return false;
+  const auto [less_ns, more_ns] = std::minmax({std::abs(there_ns), std::abs(back_ns)});
+  return less_ns >= more_ns / 2;
+}
+
+/// Returns whether most poses of a burst differ from the motion, or they lie far outside of it.
+bool isWrong(Poses begin, Poses end, const Trajectory& motion) {
+  constexpr double kSame = 0.001 + 0.1 * kRadiansPerDegree;  // as equal poses of `TrajectoryCheck`
+  const std::int64_t first_ns = motion.poses().front().t_ns - kFarAheadNs;
+  const std::int64_t last_ns = motion.poses().back().t_ns + kFarAheadNs;
+  std::size_t cursor = 0;
+  int same = 0;
+  int differ = 0;
+  for (auto pose = begin; pose != end; ++pose) {
+    if (pose->t_ns < first_ns || pose->t_ns > last_ns) ++differ;
+    const auto segment = motion.segmentAt(pose->t_ns, cursor);
+    if (!segment) continue;
+    const double step = distanceBetween(segment->first.T_world_rig, segment->last.T_world_rig);
+    const double apart = distanceBetween(segment->poseAt(pose->t_ns), pose->T_world_rig);
+    ++(apart > 2 * step + kSame ? differ : same);
+  }
+  return differ > same;
 }
 
 }  // namespace
@@ -70,13 +134,49 @@ std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& pos
   return conflict;
 }
 
-void requireOneTrajectory(const std::vector<StampedPose>& poses, const std::string& name,
-                          bool takes_lost) {
-  const std::optional<PoseConflict> conflict = findPoseConflict(poses, takes_lost);
-  if (!conflict) return;
-  throw std::runtime_error(fmt::format("{}: {}", name, conflict->text([&](std::size_t i) {
-    return formatSeconds(poses[i].t_ns) + " s";
-  })));
+std::vector<std::size_t> findWrongTimes(const std::vector<StampedPose>& poses) {
+  constexpr std::size_t kMinRight = 3;  // of them one may be out of order
+  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; };
+  if (std::is_sorted(poses.begin(), poses.end(), earlier)) return {};
+  const std::vector<bool> right = longestInOrder(poses);
+  Trajectory motion;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (right[i]) motion.add(poses[i]);
+  }
+  const auto out_of_order = static_cast<std::size_t>(std::count(right.begin(), right.end(), false));
+  if (kMinRight * out_of_order > poses.size()) return {};
+  std::vector<std::size_t> wrong;
+  for (std::size_t begin = 0, end = 0; begin < poses.size(); begin = end) {
+    for (end = begin + 1; end < poses.size() && right[end] == right[begin];) ++end;
+    if (right[begin]) continue;
+    const auto first = poses.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = poses.begin() + static_cast<std::ptrdiff_t>(end);
+    const auto [oldest, newest] = std::minmax_element(first, last, earlier);
+    const bool is_burst =
+        newest->t_ns - oldest->t_ns < kFarAheadNs && leapsAndReturns(poses, begin, end);
+    if (!is_burst || !isWrong(first, last, motion)) continue;
+    for (std::size_t i = begin; i < end; ++i) wrong.push_back(i);
+  }
+  return wrong;
+}
+
+Warning skippedPoses(std::uint64_t count, const std::string& first) {
+  return {"skipped-poses",
+          fmt::format("{} poses with wrong times were left out, the first one: {}", count, first)};
+}
+
+std::optional<Warning> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
+                                         bool takes_lost) {
+  const auto place_of = [&](std::size_t i) { return formatSeconds(poses[i].t_ns) + " s"; };
+  std::optional<Warning> warning;
+  if (const std::vector<std::size_t> wrong = findWrongTimes(poses); !wrong.empty()) {
+    warning = skippedPoses(wrong.size(), name + ": " + place_of(wrong.front()));
+    removeAt(wrong, poses);
+  }
+  if (const std::optional<PoseConflict> conflict = findPoseConflict(poses, takes_lost)) {
+    throw std::runtime_error(fmt::format("{}: {}", name, conflict->text(place_of)));
+  }
+  return warning;
 }
 
 }  // namespace efm

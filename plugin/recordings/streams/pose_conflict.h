@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mapping/base/text.h"
 #include "mapping/geometry/trajectory_check.h"
 
 namespace efm {
@@ -26,9 +29,39 @@ struct PoseConflict : TrajectoryConflict {  // `first` and `second`: in the orde
 std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& poses,
                                              bool takes_lost = false);
 
+/// Finds the poses of a file or topic whose times are wrong. Like wrong times of events they come
+/// in bursts.
+///
+/// The rule: the longest sequence of poses whose times do not go back is right. Of the others,
+/// poses in a row are wrong that span less than a second, where the times leap and leap back, and
+/// which mostly differ from the motion of the right ones at their times, or lie over a second
+/// before or after all right ones. The rest came late only. If over a third of the poses are out of
+/// order, the file has another order, and no pose is wrong.
+/// @param poses in the order of the file. @return their indices.
+std::vector<std::size_t> findWrongTimes(const std::vector<StampedPose>& poses);
+
+/// Removes the items at these rising indices.
+template <typename Item>
+void removeAt(const std::vector<std::size_t>& indices, std::vector<Item>& items) {
+  auto next = indices.begin();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (next != indices.end() && *next == i) {
+      ++next;
+    } else if (kept++ != i) {
+      items[kept - 1] = std::move(items[i]);
+    }
+  }
+  items.erase(items.begin() + static_cast<std::ptrdiff_t>(kept), items.end());
+}
+
+/// Returns the warning about poses that were left out. @param first what is wrong with the first.
+Warning skippedPoses(std::uint64_t count, const std::string& first);
+
+/// Leaves out the poses with wrong times. @return the warning, if there are any.
 /// @throws std::runtime_error with a conflict of the poses, whose places are their times.
 /// @param name name of the poses, for the error.
-void requireOneTrajectory(const std::vector<StampedPose>& poses, const std::string& name,
-                          bool takes_lost = false);
+std::optional<Warning> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
+                                         bool takes_lost = false);
 
 }  // namespace efm

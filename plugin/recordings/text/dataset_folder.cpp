@@ -88,7 +88,7 @@ void addFolderFiles(const fs::path& folder, const ReaderOptions& options, Record
     std::error_code ignored;
     if (options.leaves_out_poses || !parts.poses.empty() || !fs::exists(folder / name, ignored))
       continue;
-    parts.poses = readPoseText(folder / name, options, &parts.notes);
+    parts.poses = readPoseText(folder / name, options, parts);
   }
 }
 
@@ -133,7 +133,7 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
     parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
   if (!options.leaves_out_poses && fs::exists(folder / "groundtruth.txt", ignored)) {
-    parts.poses = readPoseText(folder / "groundtruth.txt", options, &parts.notes);
+    parts.poses = readPoseText(folder / "groundtruth.txt", options, parts);
   }
   addFolderFiles(folder, options, parts);
   return parts;

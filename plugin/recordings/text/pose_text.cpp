@@ -488,8 +488,15 @@ std::string remedyFor(const PoseConflict& conflict, const PoseText& text) {
 }
 
 std::vector<StampedPose> readPoseTable(std::string content, const std::string& file,
-                                       const ReaderOptions& options, std::vector<Warning>* notes) {
+                                       const ReaderOptions& options, RecordingParts& parts) {
   PoseText text = parsePoses(content, file, options);
+  if (const std::vector<std::size_t> wrong = findWrongTimes(text.poses); !wrong.empty()) {
+    const PoseRow& row = text.rows[wrong.front()];
+    parts.warnings.push_back(skippedPoses(
+        wrong.size(), fmt::format("{}:{}: t = {}", file, row.line, printable(text.timeOf(row)))));
+    removeAt(wrong, text.rows);
+    removeAt(wrong, text.poses);
+  }
   if (const auto conflict = findPoseConflict(text.poses)) {
     throw std::runtime_error(fmt::format("{}: {} ({})", file, conflict->text([&](std::size_t i) {
       return fmt::format("line {}", text.rows[i].line);
@@ -501,8 +508,8 @@ std::vector<StampedPose> readPoseTable(std::string content, const std::string& f
         "{}: no poses: expected at least one {}", file,
         text.table.names.empty() ? "line t tx ty tz qx qy qz qw" : "row after the header"));
   }
-  if (notes != nullptr && text.without_pose > 0) {
-    notes->push_back(
+  if (text.without_pose > 0) {
+    parts.notes.push_back(
         {"lost-poses", fmt::format("{}: {} rows have no pose, but empty fields or NaN: "
                                    "the tracker lost the body there",
                                    file, text.without_pose)});
@@ -513,13 +520,13 @@ std::vector<StampedPose> readPoseTable(std::string content, const std::string& f
 }  // namespace
 
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
-                                      const ReaderOptions& options, std::vector<Warning>* notes) {
+                                      const ReaderOptions& options, RecordingParts& parts) {
   constexpr std::size_t kMaxBytes = 2'000'000'000;
-  return readPoseTable(FileContent(file).readAll(kMaxBytes), file.string(), options, notes);
+  return readPoseTable(FileContent(file).readAll(kMaxBytes), file.string(), options, parts);
 }
 
 std::vector<StampedPose> readPoseFrames(const std::filesystem::path& file,
-                                        const ReaderOptions& options) {
+                                        const ReaderOptions& options, RecordingParts& parts) {
   using Json = nlohmann::json;
   std::ifstream stream(file);
   const Json root = Json::parse(stream, nullptr, false);
@@ -562,7 +569,7 @@ std::vector<StampedPose> readPoseFrames(const std::filesystem::path& file,
     }
   }
   return readPoseTable("t" + unit + " tx ty tz qx qy qz qw\n" + table, file.string(), options,
-                       nullptr);
+                       parts);
 }
 
 bool looksLikePoseLines(std::string_view beginning) {

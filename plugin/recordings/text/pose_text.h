@@ -23,17 +23,17 @@ inline constexpr const char* kPosesWithoutTimes =
 ///                             OptiTrack's Motive, …; other columns are ignored.
 /// Times are exact. If the header has no unit, whole numbers have the unit of the option: see
 /// `findTimeUnit`. Rows whose pose is empty or NaN are left out.
-/// @param notes receives the number of these rows; may be null.
+/// So are those with wrong times, see `findWrongTimes`.
+/// @param parts receives notes and warnings about these rows.
 /// @return the poses in the order of the file, at least one.
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
-                                      const ReaderOptions& options,
-                                      std::vector<Warning>* notes = nullptr);
+                                      const ReaderOptions& options, RecordingParts& parts);
 
 /// Reads the cameras' poses of nerfstudio's transforms.json: `frames`, each with transform_matrix,
 /// 4 x 4, and a time (timestamp, time, t_ns, …). The matrix is of OpenGL's camera (y up, z
 /// backward); the pose is that of ours (y down, z forward).
 std::vector<StampedPose> readPoseFrames(const std::filesystem::path& file,
-                                        const ReaderOptions& options);
+                                        const ReaderOptions& options, RecordingParts& parts);
 
 /// Returns whether the complete lines at the beginning of a file are poses.
 bool looksLikePoseLines(std::string_view beginning);

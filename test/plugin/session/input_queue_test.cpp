@@ -142,7 +142,10 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   enum { kTake = 8, kPause };
   const auto steps = *rc::gen::container<std::vector<std::tuple<int, int, int>>>(rc::gen::tuple(
       rc::gen::inRange(0, kPause + 1), rc::gen::inRange(0, 3), rc::gen::inRange(0, 90)));
-  std::int64_t t_ns = 100;
+  std::int64_t t_ns = 2'000'000'000;
+  for (; poses < 3; ++poses) {  // a second of poses confirms them
+    queue.add(PoseSample{{}, t_ns - 600'000'000 * std::int64_t(2 - poses), {}, {}});
+  }
   for (const auto& [kind, camera, events] : steps) {
     const Waiting one{camera, static_cast<std::size_t>(events), kind == 0 ? t_ns - 5 : ++t_ns};
     QueueCounts& counts = expected[camera];
@@ -243,6 +246,32 @@ RC_GTEST_PROP(InputQueue, RejectsAloneWhatIsFarAheadOfItsStream, ()) {
   RC_ASSERT(poses_ns == expected);
   RC_ASSERT(queue.counts().at(0).fates[EventFate::kRejected] == wrong);
   RC_ASSERT(queue.rejectedPoses() == wrong);
+}
+
+// Exactly a burst of poses with wrong times is left out, with and without events beside the poses.
+RC_GTEST_PROP(PoseIntake, LeavesOutABurstOfWrongTimesAlone, ()) {
+  const auto length = *rc::gen::inRange<std::int64_t>(1, 1000);
+  const auto at = *rc::gen::element<std::int64_t>(0, 2000, 4000);
+  const auto shift_ns = *rc::gen::inRange<std::int64_t>(11'000, 400'000'000) * 1'000'000;
+  const auto ahead_of_poses_ns = *rc::gen::element<std::int64_t>(0, 300'000'000);
+  const auto has_events = *rc::gen::arbitrary<bool>();
+  PoseIntake intake;
+  std::vector<std::int64_t> good_ns, right_ns;
+  const auto take = [&](const std::vector<PoseSample>& poses) {
+    for (const PoseSample& pose : poses) right_ns.push_back(pose.t_ns);
+  };
+  for (std::int64_t i = 0; i < 4000 + length; ++i) {
+    const std::int64_t t_ns = i * 1'000'000;
+    const bool wrong = i >= at && i < at + length;
+    if (!wrong) good_ns.push_back(t_ns);
+    take(intake.add(PoseSample{{}, wrong ? t_ns + shift_ns : t_ns, {}, {}}));
+    if (has_events && i % 10 == 0) take(intake.noteEvents(t_ns + ahead_of_poses_ns));
+  }
+  take(intake.finish());
+  const bool same = right_ns == good_ns;  // not printed: long
+  RC_ASSERT(same);
+  RC_ASSERT(intake.wrongPoses() == static_cast<std::uint64_t>(length));
+  RC_ASSERT(!intake.firstWrong().empty());
 }
 
 TEST(InputQueue, EndPassesTheHeldEvents) {

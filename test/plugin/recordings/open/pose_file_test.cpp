@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "plugin/recordings/open/recording_formats.h"
+#include "plugin/recordings/streams/pose_conflict.h"
 #include "test/plugin/recordings/columns/zip_file.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -248,6 +253,29 @@ TEST_F(PoseFile, OneFileHasOneTrajectoryAndAnErrorTellsHowToTakeIt) {
       EXPECT_LE(std::abs(pose.T_world_rig.translation.y()), 1e-9) << row.name << ": " << command;
     }
   }
+}
+
+// Of a body that moves, exactly a burst with wrong times is left out; poses that come late are not.
+RC_GTEST_PROP(PoseConflict, FindsABurstOfWrongTimesAlone, ()) {
+  const auto length = *rc::gen::inRange<std::size_t>(1, 900);
+  const auto at = *rc::gen::inRange<std::size_t>(length + 1, 3999 - 2 * length);
+  const auto shift_ms = *rc::gen::oneOf(rc::gen::inRange<std::int64_t>(1000, 400'000'000),
+                                        rc::gen::inRange<std::int64_t>(-400'000'000, -1000));
+  const auto comes_late = *rc::gen::element<std::size_t>(0, 1, 20);  // poses later
+  const auto late = *rc::gen::inRange<std::size_t>(0, 3900);
+  std::vector<StampedPose> poses;
+  for (std::int64_t ms = 0; ms < 4000; ++ms) {
+    const double s = 1e-3 * static_cast<double>(ms);
+    poses.push_back({ms * 1'000'000, {Eigen::Quaterniond::Identity(), {s, std::sin(3 * s), 0}}});
+  }
+  std::vector<std::size_t> expected(length);
+  std::iota(expected.begin(), expected.end(), at);
+  for (const std::size_t i : expected) poses[i].t_ns += shift_ms * 1'000'000;
+  if (late + comes_late < at || late > at + length) {
+    const auto from = poses.begin() + static_cast<std::ptrdiff_t>(late);
+    std::rotate(from, from + 1, from + 1 + static_cast<std::ptrdiff_t>(comes_late));
+  }
+  RC_ASSERT(findWrongTimes(poses) == expected);
 }
 
 TEST_F(PoseFile, TimesOfPosesAreNeitherNumbersOfFramesNorOneTime) {
