@@ -41,7 +41,7 @@ static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == EFM_EIGEN_ALIGN,
               "engine with the same -march");
 #endif
 
-class MapperCore;
+class MapperDriver;
 class OptionReader;
 struct EventFusionOptions;
 
@@ -194,11 +194,11 @@ class Mapper {
   /// playback, poses against events if options are automatic; `mapRecording` judges always.
   std::vector<Warning> warnings() const;
 
-  /// For hosts in this project: mapper_core.h is not installed.
-  MapperCore& core() const { return *core_; }
+  /// For hosts in this project: mapper_driver.h is not installed.
+  MapperDriver& driver() const { return *driver_; }
 
  private:
-  std::shared_ptr<MapperCore> core_;
+  std::shared_ptr<MapperDriver> driver_;
 };
 
 /// What `mapRecording` made.

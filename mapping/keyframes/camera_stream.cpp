@@ -60,30 +60,6 @@ std::int64_t CameraStream::lateBefore() const {
   return newest_ns_ ? lateAfter(*newest_ns_ - camera_.time_offset_ns) : kMinTimeNs;
 }
 
-bool CameraStream::isOlder(const std::vector<Event>& events) const {
-  std::int64_t late_before_ns = kMinTimeNs;  // within the packet
-  for (const Event& event : events) {
-    if (event.t_ns < late_before_ns || event.t_ns >= lateBefore()) return false;
-    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
-  }
-  return !events.empty();
-}
-
-std::uint64_t CameraStream::dropLate(std::vector<Event>& events) {
-  std::int64_t late_before_ns = lateBefore();
-  const auto is_late = [&](const Event& event) {
-    if (event.t_ns < late_before_ns) return true;
-    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
-    return false;
-  };
-  const auto late = std::remove_if(events.begin(), events.end(), is_late);
-  const auto count = static_cast<std::uint64_t>(events.end() - late);
-  events.erase(late, events.end());
-  counts_.read += count;
-  counts_[EventFate::kDropped] += count;
-  return count;
-}
-
 std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& limits,
                                 std::int64_t released_ns) {
   counts_.read += events.size();

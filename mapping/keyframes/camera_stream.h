@@ -28,10 +28,6 @@ class CameraStream {
   /// @throws std::invalid_argument if the packet begins over 10 ms before the newest event of
   /// earlier packets, or its times leave the limits of time by the camera's offset.
   void requireNext(const CheckedEvents& packet) const;
-  /// See FusionMapper::isOlder.
-  bool isOlder(const std::vector<Event>& events) const;
-  /// See FusionMapper::dropLate.
-  std::uint64_t dropLate(std::vector<Event>& events);
   /// Adds valid events to the filter, or to the buffer if there is no filter. Events before
   /// `released_ns`, outside the limits and outside the lens are counted, and not added.
   /// @return the number of events that came after a newer event.

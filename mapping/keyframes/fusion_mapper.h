@@ -68,16 +68,6 @@ class FusionMapper : private RecordingProgress {
   /// @throws std::invalid_argument if they begin over 10 ms before the newest event of earlier
   /// calls. Then no event of this call is added.
   void addEvents(int camera, CheckedEvents events);
-  /// Returns whether a camera's clock may have been reset: the events are in time order (to 10 ms),
-  /// and each event is more than 10 ms older than the newest event of earlier calls.
-  bool isOlder(int camera, const std::vector<Event>& events) const {
-    return cameras_.at(static_cast<std::size_t>(camera)).isOlder(events);
-  }
-  /// Removes the events that are more than 10 ms older than an event before them, and counts them
-  /// as read and dropped. To be called before `addEvents` if such events are no error.
-  void dropLate(int camera, std::vector<Event>& events) {
-    counts_.late_events += cameras_.at(static_cast<std::size_t>(camera)).dropLate(events);
-  }
   /// Declares that all of a camera's events before `t_ns` (its own clock) have been added, so that
   /// a camera without events does not delay other cameras. Without this call, a camera's events are
   /// complete until 10 ms before its newest event. A camera is silent if it has no event in the

@@ -72,7 +72,6 @@ struct MapperCounts {
   DroppedWindows dropped_windows;            ///< Dropped by `dropWindow` and `dropWindowsBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;  ///< Events that came after a newer event of their camera.
-  std::uint64_t late_events = 0;    ///< See `FusionMapper::dropLate`.
   std::uint64_t duplicate_poses = 0;
   MotionCounts motion;
 
@@ -92,7 +91,6 @@ struct MapperCounts {
     dropped_windows += other.dropped_windows;
     silent_subintervals += other.silent_subintervals;
     sorted_events += other.sorted_events;
-    late_events += other.late_events;
     duplicate_poses += other.duplicate_poses;
     motion += other.motion;
     return *this;

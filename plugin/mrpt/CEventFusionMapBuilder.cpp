@@ -18,7 +18,7 @@
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
-#include "plugin/session/mapper_core.h"
+#include "plugin/session/mapper_driver.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
@@ -71,7 +71,7 @@ std::shared_ptr<RigFromPackets> CEventFusionMapBuilder::packets() const {
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
   // Checked before the lock: the thread that holds it may wait for the end of this callback.
-  if (const auto current = mapper(); current && current->core().runsHere()) {
+  if (const auto current = mapper(); current && current->driver().runsHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
@@ -88,7 +88,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
   packets_ = std::move(packets);
-  mapper_->core().setSink(sink_);
+  mapper_->driver().setSink(sink_);
   tracker_poses_ = {};
   options_ = builder_options;
   ignored_observations_ = 0;
@@ -133,7 +133,7 @@ std::function<void(const Argument&)> CEventFusionMapBuilder::hosts(
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
-  mapper_->core().setSink(sink);
+  mapper_->driver().setSink(sink);
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
@@ -142,7 +142,7 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     packets()->add(*events, options.enableMapUpdating);  // MRPT's option of every map builder
   } else if (auto pose = poseIn(*observation)) {
     const auto mapper = this->mapper();
-    pose->T_body_rig = mapper->core().setup().T_body_rig.value_or(pose->T_body_rig);
+    pose->T_body_rig = mapper->driver().setup().T_body_rig.value_or(pose->T_body_rig);
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       tracker_poses_.add(*observation, *pose);
@@ -267,13 +267,13 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  return static_cast<unsigned int>(mapper()->core().numKeyframes());
+  return static_cast<unsigned int>(mapper()->driver().newest(false)->keyframes.size());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
   std::unique_lock<std::mutex> lock(made_mutex_);
   const auto mapper = mapperOfMade();
-  const GlobalCloudOptions cloud_options = mapper->core().cloudOptions();
+  const GlobalCloudOptions cloud_options = mapper->driver().cloudOptions();
   const auto map_so_far = mapper->keyframes();
   MapCloud::ConstPtr points = map_so_far->points;  // null in playback
   if (!points) {
@@ -297,13 +297,13 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 /// Warns once.
 void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
   if (warned_of_rounding_) return;
-  const auto warning = roundingWarning(points, mapper()->core().cloudOptions().voxel_size_m);
+  const auto warning = roundingWarning(points, mapper()->driver().cloudOptions().voxel_size_m);
   if (warning && !warned_of_rounding_.exchange(true)) MRPT_LOG_WARN(*warning);
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  const auto [depth, planes] = mapper()->core().newestDepth();
+  const auto [depth, planes] = mapper()->driver().newestDepth();
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {

@@ -21,7 +21,7 @@
 #include "plugin/results/viewer/map_page.h"
 #include "plugin/session/first_look.h"
 #include "plugin/session/host_text.h"
-#include "plugin/session/mapper_core.h"
+#include "plugin/session/mapper_driver.h"
 
 namespace efm {
 
@@ -212,11 +212,7 @@ void MapSteps::warnOfNew() {
 void MapSteps::begin() {
   began_ = std::chrono::steady_clock::now();
   const RecordingSource all = job.sourceNow();
-  if (!job.out.empty()) {
-    rejectOutputFolder(job, kind);
-    report.warnings = replacementWarnings(job.out, all);
-    warnOfNew();
-  }
+  if (!job.out.empty()) rejectOutputFolder(job, kind);
   recording = firstLook();
   options.mapper.keyframe.sequence_maximum = sequenceMaximum();
   const bool changes = job.sourceNow().faults.perturbation.keyframe.any();  // by the chosen stride
@@ -232,6 +228,10 @@ void MapSteps::begin() {
 std::unique_ptr<Recording> MapSteps::firstLook() {
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
+  if (!job.out.empty()) {  // a recording that cannot be opened replaces nothing
+    report.warnings = replacementWarnings(job.out, job.sourceNow());
+    warnOfNew();
+  }
   Recording& source = held->source();
   if (std::vector<int> chosen = source.counts().of_calibration; !chosen.empty()) {
     job.source.cameras = std::move(chosen);  // they are all cameras of the recording
@@ -500,7 +500,7 @@ MapResult mapInto(MapJob job) {
                      if (writes) writer.add(keyframe);
                      if (steps.job.on_keyframe) steps.job.on_keyframe(keyframe, so_far);
                    });
-    run.mapper().core().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
+    run.mapper().driver().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
     bool stopped = false;
     while (!(stopped = steps.asksToStop()) && run.mapNext()) {
       steps.tellProgress("mapping", run.fraction());
@@ -545,8 +545,8 @@ MapResult mapWindowInto(MapJob job) {
                      writer.add(keyframe);
                      if (steps.job.on_keyframe) steps.job.on_keyframe(keyframe, so_far);
                    });
-    run.mapper().core().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
-    if (dsi.receives()) run.mapper().core().setSink(&dsi);
+    run.mapper().driver().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
+    if (dsi.receives()) run.mapper().driver().setSink(&dsi);
     while (run.mapNext()) {  // without its keyframe, a window has no result
       if (!made) steps.requireNoStop();
       steps.tellProgress("mapping", run.fraction());

@@ -35,7 +35,7 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
   of_rig.rig = {};  // the recording has its files
   of_rig.rig.pose_source = options.rig.pose_source;
   mapper_ = std::make_shared<Mapper>(of_rig, std::move(callbacks));
-  mapper_->core().setFacts(first_.quality);
+  mapper_->driver().setFacts(first_.quality);
   attempt([this] {
     give([this] { mapper_->addCameras(recording_.rig()); });
     return true;

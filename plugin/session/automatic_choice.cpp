@@ -87,7 +87,8 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
     const std::int64_t begin_ns = std::min(segment_.begin_ns, data->window.t0_ns);
     const double segment_s = secondsBetween(begin_ns, data->window.t1_ns);
-    if (segmentEnds() && segment_s < kFirstWindowS) {
+    const bool jumps = break_ && std::holds_alternative<Jump>(*break_);
+    if (jumps && segment_s < kFirstWindowS) {
       limitWindow(segment_s / 2, kBetweenJumps, chosen.policy, choice.options);
     }
     fitIntoQueue(options_.live, eventRate(*data), chosen.policy, choice.options);

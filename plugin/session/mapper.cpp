@@ -2,7 +2,7 @@
 #include "event_fusion/engine.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/host_text.h"
-#include "plugin/session/mapper_core.h"
+#include "plugin/session/mapper_driver.h"
 
 namespace efm {
 
@@ -22,20 +22,20 @@ Mapper::Callbacks forHost(Mapper::Callbacks callbacks) {
 
 Mapper::Mapper(const Options& options, Callbacks callbacks,
                const std::vector<StoredKeyframe>& earlier)
-    : core_(forHost(kFace, [&] {
-        return MapperCore::make(options.values(), forHost(std::move(callbacks)), earlier);
+    : driver_(forHost(kFace, [&] {
+        return MapperDriver::make(options.values(), forHost(std::move(callbacks)), earlier);
       })) {}
 
 Mapper::~Mapper() = default;
 
 int Mapper::addCamera(const RigCamera& camera) {
-  return forHost(kFace, [&] { return core_->addCamera(camera); });
+  return forHost(kFace, [&] { return driver_->addCamera(camera); });
 }
 void Mapper::addCameras(const Rig& rig) {
-  forHost(kFace, [&] { core_->addCameras(rig); });
+  forHost(kFace, [&] { driver_->addCameras(rig); });
 }
 void Mapper::addEvents(int camera, std::vector<Event> events) {
-  forHost(kFace, [&] { core_->addEvents(camera, std::move(events)); });
+  forHost(kFace, [&] { driver_->addEvents(camera, std::move(events)); });
 }
 void Mapper::addPose(const StampedPose& pose, const std::optional<PoseNoise>& noise) {
   PoseSample sample;
@@ -45,22 +45,22 @@ void Mapper::addPose(const StampedPose& pose, const std::optional<PoseNoise>& no
   add(std::move(sample));
 }
 void Mapper::add(Sample sample) {
-  forHost(kFace, [&] { core_->add(std::move(sample)); });
+  forHost(kFace, [&] { driver_->add(std::move(sample)); });
 }
 void Mapper::finish() {
-  forHost(kFace, [&] { core_->finish(); });
+  forHost(kFace, [&] { driver_->finish(); });
 }
-void Mapper::stop() { core_->stop(); }
+void Mapper::stop() { driver_->stop(); }
 
-std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return core_->newest(true); }
-std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return core_->newest(false); }
+std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return driver_->newest(true); }
+std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return driver_->newest(false); }
 SessionStatus Mapper::status() const {
-  SessionStatus status = core_->status();
+  SessionStatus status = driver_->status();
   status.pose_warnings = hostTexts(std::move(status.pose_warnings), kFace);
   status.pose_notes = hostTexts(std::move(status.pose_notes), kFace);
   if (status.live) status.live->last_error = hostText(status.live->last_error, kFace);
   return status;
 }
-std::vector<Warning> Mapper::warnings() const { return hostTexts(core_->warnings(), kFace); }
+std::vector<Warning> Mapper::warnings() const { return hostTexts(driver_->warnings(), kFace); }
 
 }  // namespace efm

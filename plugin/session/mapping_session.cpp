@@ -50,7 +50,6 @@ MappingSession::MappingSession(const EventFusionOptions& options)
     : automatic_(options.automatic),
       options_(options),
       pose_source_(options.rig.pose_source),
-      guard_(options.live),
       mapper_(mapperOptions(options)),
       cloud_(options.cloud, options.movableKeyframes()) {
   if (!options.live.enabled && options.automatic.any()) {  // live operation cannot look ahead
@@ -67,22 +66,27 @@ void MappingSession::addCameras(const Rig& rig) {
   for (const RigCamera& camera : rig.cameras) mapper_.addCamera(camera);
 }
 
+void MappingSession::add(Input input) {
+  endPiece();  // complete windows before the break are mapped
+  if (const auto* rig = std::get_if<Rig>(&input)) addCameras(*rig);
+  if (auto* packet = std::get_if<EventPacket>(&input)) addEvents(std::move(*packet));
+  if (const auto* pose = std::get_if<PoseSample>(&input)) addPose(*pose);
+  if (const auto* missing = std::get_if<Missing>(&input)) noteMissing(*missing);
+  if (std::holds_alternative<ClockReset>(input)) break_ = ClockReset{};
+  const auto* const jump = std::get_if<Jump>(&input);
+  if (!jump) return;
+  useSelected();
+  if (pose_source_.selected() == jump->source) break_ = *jump;
+}
+
 void MappingSession::addEvents(EventPacket packet) {
-  if (guard_.clockWentBack()) {
-    const std::size_t events = packet.events.size();
-    guard_.hold([this, held = std::move(packet)]() mutable { addEvents(std::move(held)); }, events);
-    return;
-  }
   if (first_look_) look([&] { first_look_->addEvents(packet); });
   const int camera = packet.camera;
   const std::uint64_t complete = mapper_.readEvents() + packet.events.size();
-  std::optional<std::int64_t> older_ns;
   try {
-    older_ns = guard_.admit(mapper_, packet);
     feed(std::move(packet));
   } catch (...) {  // contradicts its camera, or no memory
     status_.rejected_events[camera] += complete - mapper_.readEvents();
-    if (older_ns) guard_.noteOlder(camera, *older_ns);
     throw;
   }
 }
@@ -100,49 +104,32 @@ void MappingSession::feed(EventPacket packet) {
   if (packet.complete_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.complete_until_ns);
   if (empty) {
     if (!packet.complete_until_ns) return;
-    guard_.dropMissing(mapper_, packet.camera,
-                       trajectoryTime(*packet.complete_until_ns, offset_ns));
+    dropMissing(packet.camera, trajectoryTime(*packet.complete_until_ns, offset_ns));
     return;
   }
-  guard_.dropMissing(mapper_, packet.camera, std::max(first_ns, last_ns) + offset_ns);
+  dropMissing(packet.camera, std::max(first_ns, last_ns) + offset_ns);
   const std::int64_t begin_ns = first_ns + offset_ns;
-  guard_.noteInTime(packet.camera, begin_ns);
   if (!status_.events) segment_.begin_ns = begin_ns;
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
-  guard_.dropOverdue(mapper_, *newest_begin_ns_);
+  dropOverdue(*newest_begin_ns_);
   if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs ||
-      guard_.fillsQueue(mapper_.heldEvents())) {
+      (options_.live.enabled &&
+       static_cast<double>(heldEvents()) > options_.live.queueEvents() / 2)) {
     useSelected();
   }
 }
 
 void MappingSession::addPose(const PoseSample& sample) {
-  if (guard_.clockWentBack()) {
-    guard_.hold([this, sample] {
-      try {
-        addPose(sample);
-      } catch (const std::invalid_argument&) {
-        guard_.countRejectedPose();
-      }
-    });
-    return;
-  }
   if (first_look_) look([&] { first_look_->addPose(sample); });
-  const StampedPose pose{sample.t_ns, sample.T_world_rig()};
   const PoseSourceId& source = sample.source;
-  const std::vector<StampedPose> poses = pose_source_.add(source, pose);
-  try {
-    for (const StampedPose& next : poses) usePose({next, sample.noise});
-  } catch (const std::invalid_argument&) {
-    guard_.noteOlderPose(pose.t_ns);
-    throw;
+  for (const StampedPose& pose : pose_source_.add(source, {sample.t_ns, sample.T_world_rig()})) {
+    usePose(pose);
   }
-  if (!poses.empty()) guard_.noteInTime(LiveGuard::kTracker, pose.t_ns);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // If two poses have the same time, the first one is used, and so is its noise.
-  if (refinement_ && used) noises_[source].try_emplace(pose.t_ns, sample.noise);
+  if (refinement_ && used) noises_[source].try_emplace(sample.t_ns, sample.noise);
 }
 
 /// Returns the stated noise of the last pose up to a time. Forgets the noise of earlier poses.
@@ -155,73 +142,77 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   return noises.begin()->second;
 }
 
-void MappingSession::usePose(const NoisyPose& pose) {
-  if (guard_.holdsPose(pose)) return;
-  mapper_.addPose(pose.pose);
-  extend(status_.poses, pose.pose.t_ns);
-  guard_.notePose(pose.pose);
+void MappingSession::usePose(const StampedPose& pose) {
+  mapper_.addPose(pose);
+  extend(status_.poses, pose.t_ns);
+  newest_pose_ns_ = std::max(newest_pose_ns_.value_or(pose.t_ns), pose.t_ns);
 }
 
-/// Uses poses, also after a rejected pose. In playback, throws the first error at the end.
-void MappingSession::useWaiting(const std::vector<NoisyPose>& poses) {
+/// Selects a source of poses, if there is none yet, and uses its waiting poses, also after a
+/// rejected pose. In playback, throws the first error at the end.
+void MappingSession::useSelected() {
   std::exception_ptr error;
-  for (const NoisyPose& pose : poses) {
+  for (const StampedPose& pose : pose_source_.select()) {
     try {
       usePose(pose);
     } catch (const std::invalid_argument&) {
-      if (!guard_.countRejectedPose() && !error) error = std::current_exception();
+      ++live_.rejected_poses;
+      if (!options_.live.enabled && !error) error = std::current_exception();
     }
   }
   if (error) std::rethrow_exception(error);
 }
 
-/// Selects a source of poses, if there is none yet, and uses its waiting poses.
-void MappingSession::useSelected() {
-  std::vector<NoisyPose> poses;
-  for (const StampedPose& pose : pose_source_.select()) poses.push_back({pose, std::nullopt});
-  useWaiting(poses);
-}
-
-void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
+void MappingSession::noteMissing(const Missing& missing) {
   constexpr double kEnoughS = 0.2;
   first_look_ends_ = true;
   if (missing.reason == DropReason::kOverload) chooseFromSoFar(kEnoughS);
-  if (guard_.clockWentBack()) {
-    guard_.hold([=] { guard_.noteMissing(camera, missing); });
-    return;
+  Missing& noted = missing_.try_emplace(missing.camera, missing).first->second;
+  noted.until_ns = std::max(noted.until_ns, missing.until_ns);
+  noted.reason = missing.reason;
+}
+
+/// Returns the end of what is missing, on the clock of the poses; std::nullopt if nothing is.
+std::optional<std::int64_t> MappingSession::missingUntil(int camera) const {
+  const auto missing = missing_.find(camera);
+  const auto index = static_cast<std::size_t>(camera);
+  const std::vector<RigCamera>& cameras = mapper_.rig().cameras;
+  if (missing == missing_.end() || index >= cameras.size()) return std::nullopt;
+  return trajectoryTime(missing->second.until_ns, cameras[index].time_offset_ns);
+}
+
+/// Drops the windows that need missing events of a camera.
+/// @param next_ns the camera's next data begin here at the latest. No event is missing after it.
+void MappingSession::dropMissing(int camera, std::int64_t next_ns) {
+  const std::optional<std::int64_t> until_ns = missingUntil(camera);
+  if (!until_ns) return;
+  mapper_.dropWindowsBefore(std::min(*until_ns, next_ns), missing_.at(camera).reason);
+  missing_.erase(camera);
+}
+
+/// Drops the windows that need missing events of cameras that send nothing any more.
+/// @param newest_begin_ns begin of the newest packet of any camera.
+void MappingSession::dropOverdue(std::int64_t newest_begin_ns) {
+  const std::map<int, Missing> missing = missing_;
+  for (const auto& [camera, events] : missing) {
+    const std::optional<std::int64_t> until_ns = missingUntil(camera);
+    if (until_ns && *until_ns <= newest_begin_ns) dropMissing(camera, kMaxTimeNs);
   }
-  guard_.noteMissing(camera, missing);
 }
 
-/// Returns whether the tracker jumped and all events before the jump have arrived.
-bool MappingSession::segmentEnds() const {
-  return guard_.jumped() && (finished_ || mapper_.eventsCompleteNs() >= guard_.beforeJumpNs());
-}
-
-/// Continues with the poses after a jump when all windows before it are mapped. Drops windows that
-/// contain the jump. @return true if it continued.
-bool MappingSession::beginSegment() {
-  if (!segmentEnds()) return false;
-  const std::int64_t begin_ns = guard_.afterJumpNs();
-  mapper_.dropWindowsBefore(begin_ns, DropReason::kJump);
-  fitIntoSegments(begin_ns);
-  useWaiting(guard_.beginSegment());
-  finishMapper();  // impossible in `finish` while poses were held
-  return true;
-}
-
-/// Continues with the clock after a reset when the complete windows before it are mapped.
-/// @return true if it continued.
-bool MappingSession::beginClock() {
-  if (!guard_.clockWentBack()) return false;
-  restartMapper();
-  for (const std::function<void()>& add : guard_.beginClock()) {  // may hold input again
-    try {
-      add();
-    } catch (...) {  // the events are counted
-    }
+/// Goes on behind a break of the input, if there is one. The complete windows before it must have
+/// been mapped. @return whether there was one.
+bool MappingSession::endPiece() {
+  if (!break_) return false;
+  const auto ended = *std::exchange(break_, std::nullopt);
+  if (const auto* jump = std::get_if<Jump>(&ended)) {
+    ++live_.pose_jumps;
+    mapper_.dropWindowsBefore(jump->after_ns, DropReason::kJump);
+    fitIntoSegments(jump->after_ns);
+  } else {
+    ++live_.clock_resets;
+    restartMapper();
   }
-  finishMapper();
   return true;
 }
 
@@ -236,47 +227,58 @@ void MappingSession::restartMapper() {
   segment_ = {};
   status_.events.reset();
   newest_begin_ns_.reset();
+  newest_pose_ns_.reset();
+  missing_.clear();
   noises_.clear();
   no_scene_since_ns_.reset();
   events_without_scene_ = 0;
   look_again_ns_ = kMinTimeNs;
 }
 
-/// Ends the mapper's input, after the poses behind a jump and the data behind a reset are in.
-/// Before that, marks the events as complete if there is a jump.
-void MappingSession::finishMapper() {
-  if (!finished_ || guard_.clockWentBack()) return;
-  if (!guard_.jumped()) return mapper_.finish();
-  const auto cameras = static_cast<int>(mapper_.rig().cameras.size());
-  for (int camera = 0; camera < cameras; ++camera) mapper_.setCompleteUntil(camera, kMaxTimeNs);
-}
-
 void MappingSession::finish() {
+  endPiece();
   finished_ = true;
-  guard_.dropAllMissing(mapper_);
+  dropOverdue(kMaxTimeNs);
+  missing_.clear();
   std::exception_ptr error;
   try {
     useSelected();
   } catch (const std::invalid_argument&) {  // the other poses are used
     error = std::current_exception();
   }
-  finishMapper();
+  mapper_.finish();
   if (error) std::rethrow_exception(error);
 }
 
-/// Limits the wait of events and poses if no window can be mapped.
+/// In live operation, limits the time that events and poses wait for each other if no window can be
+/// mapped: drops the windows whose poses are overdue, and treats overdue events as silence.
 void MappingSession::limitWaits() {
-  if (finished_) return;
-  const auto needed_ns = guard_.limitWaits(mapper_, pose_source_, status_.events);
-  if (!needed_ns) return;
-  for (auto& [source, noises] : noises_) {
-    noises.erase(noises.begin(), noises.lower_bound(*needed_ns));
+  constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
+  if (finished_ || !options_.live.enabled) return;
+  pose_source_.limitWaiting(kMaxEventWaitNs);
+  std::optional<std::int64_t> newest_ns = pose_source_.waitingNs();
+  if (newest_pose_ns_) {
+    newest_ns = *newest_pose_ns_;
+    mapper_.setAllCompleteUntil(*newest_ns - kMaxEventWaitNs);
+  }
+  if (newest_ns) {
+    const std::int64_t needed_ns = std::max(*newest_ns, -kEndOfTimeNs) - kMaxEventWaitNs;
+    for (auto& [source, noises] : noises_) {
+      noises.erase(noises.begin(), noises.lower_bound(needed_ns));
+    }
+  }
+  if (!status_.events) return;
+  const std::int64_t overdue_ns =
+      status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
+  if (!newest_ns || *newest_ns < overdue_ns) {
+    mapper_.dropWindowsBefore(overdue_ns, DropReason::kNoPose);
   }
 }
 
 void MappingSession::limitHeld(double max_events) {
   const auto is_excess = [&] { return static_cast<double>(heldEvents()) > max_events; };
-  if (is_excess() && chooseFromSoFar(0)) return;
+  constexpr double kEnoughS = 0.001;
+  if (is_excess() && chooseFromSoFar(kEnoughS)) return;
   while (is_excess() && dropOldestWindow()) {
   }
   if (is_excess() && !nextWindow()) dropOlderHalf();
@@ -321,7 +323,7 @@ void MappingSession::dropOlderHalf() {
       "a window needs {:.0f} events, the queue holds {:.0f}: expected smaller windows ([keyframes] "
       "window_s, window_events), or a larger [live] max_queue_events and max_queue_mb",
       needed, queue_events);
-  guard_.setTooLarge(why);
+  live_.too_large = why;
   throw std::invalid_argument(why);
 }
 
@@ -338,7 +340,6 @@ bool MappingSession::dropFailedWindow() {
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,
                                                      const KeyframeStore& store) {
   keyframe_lost_ = false;
-  if (!hasCameras()) beginClock();
   if (!hasCameras() || !chooseAutomatic()) {
     limitWaits();
     return std::nullopt;
@@ -446,7 +447,14 @@ SessionStatus MappingSession::status() const {
   status.held_events = heldEvents();
   status.counts = earlier_counts_;
   status.counts += mapper_.counts();
-  status.live = guard_.status(status.rejected_events, status.counts, options_.mapper.cameras);
+  if (options_.live.enabled) {
+    LiveStatus& live = status.live.emplace(live_);
+    for (const auto& [camera, events] : status.rejected_events) live.cameras[camera].lost += events;
+    for (const int camera : selectedCameras(mapper_.rig(), options_.mapper.cameras)) {
+      live.cameras[camera].lost +=
+          status.counts.cameras[static_cast<std::size_t>(camera)].fates.losses();
+    }
+  }
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <variant>
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
@@ -15,7 +16,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/first_look.h"
-#include "plugin/session/live_guard.h"
+#include "plugin/session/input.h"
 #include "plugin/session/map_quality.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"
@@ -38,16 +39,20 @@ class MappingSession {
  public:
   explicit MappingSession(const EventFusionOptions& options);
 
-  /// Adds all cameras, before the first events.
-  /// @param rig must be valid for `requireMappable`.
-  void addCameras(const Rig& rig);
-  /// Adds a packet.
-  /// @throws std::invalid_argument if the packet is older than earlier packets of its camera.
-  void addEvents(EventPacket packet);
-  /// Adds a pose. Poses of one source are used: see PoseSourceSelector. The session waits for a
-  /// better source until a packet begins over a second after the first one; in live operation not
-  /// longer than the events fill half of the queue.
-  void addPose(const PoseSample& sample);
+  /// Adds input, in the order of time: first the cameras, all at once, which must be valid for
+  /// `requireMappable`. `next` must have returned std::nullopt before input behind a break is
+  /// added.
+  ///
+  /// Poses of one source are used: see PoseSourceSelector. The session waits for a better source
+  /// until a packet begins over a second after the first one; in live operation not longer than the
+  /// events fill half of the queue.
+  ///
+  /// When the next packet of a camera with missing events arrives, the windows that need them are
+  /// dropped. If automatic options are not chosen yet, they are chosen from the data so far, in
+  /// live operation if these last at least 0.2 s.
+  /// @throws std::invalid_argument if a packet is older than earlier packets of its camera, or a
+  /// pose is not valid or over a second older than another one.
+  void add(Input input);
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
   /// Ends the input.
@@ -71,10 +76,6 @@ class MappingSession {
                                        const ProcessorClock& clock = processSeconds,
                                        const KeyframeStore& store = {});
 
-  /// Reports that events of a camera are missing. When the camera's next packet arrives, the
-  /// windows that need the missing events are dropped. If automatic options are not chosen yet,
-  /// they are chosen from the data so far, in live operation if these last at least 0.2 s.
-  void noteMissing(int camera, const MissingEvents& missing);
   /// Drops the oldest windows until at most this number of events is held, as long as newer events
   /// fill another window. If no window can be mapped, it is too large or waits for poses: then the
   /// windows of the older half of the events are dropped. If a window is larger than the queue of
@@ -106,6 +107,8 @@ class MappingSession {
   };
   Chosen chosen() const { return {newest_planes_.value_or(planes()), status_.choices}; }
   SessionStatus status() const;
+  /// Returns the time until which the events of the selected cameras are complete.
+  std::int64_t eventsCompleteNs() const { return mapper_.eventsCompleteNs(); }
   /// Returns the number of keyframes whose motion was corrected.
   std::uint64_t correctedKeyframes() const {
     return earlier_counts_.motion.corrected + mapper_.correctedKeyframes();
@@ -119,22 +122,24 @@ class MappingSession {
   const DepthPlanesOptions& planes() const {
     return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
   }
-  std::size_t heldEvents() const { return mapper_.heldEvents() + guard_.heldEvents(); }
+  std::size_t heldEvents() const { return mapper_.heldEvents(); }
   bool hasCameras() const { return !mapper_.rig().cameras.empty(); }
+  void addCameras(const Rig& rig);
+  void addEvents(EventPacket packet);
+  void addPose(const PoseSample& sample);
+  void noteMissing(const Missing& missing);
+  std::optional<std::int64_t> missingUntil(int camera) const;
+  void dropMissing(int camera, std::int64_t next_ns);
+  void dropOverdue(std::int64_t newest_begin_ns);
   void feed(EventPacket packet);
-  void usePose(const NoisyPose& pose);
-  void useWaiting(const std::vector<NoisyPose>& poses);
+  void usePose(const StampedPose& pose);
   void useSelected();
-  void finishMapper();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   void limitWaits();
   // A piece of the input has one clock, and no jump of the tracker.
-  bool segmentEnds() const;
-  bool beginSegment();
-  bool beginClock();
+  bool pieceEnds() const { return break_.has_value(); }
+  bool endPiece();
   void restartMapper();
-  bool pieceEnds() const { return segmentEnds() || guard_.clockWentBack(); }
-  bool endPiece() { return beginSegment() || beginClock(); }
   // Functions that limit the held events.
   std::optional<Window> nextWindow();
   bool dropOldestWindow();
@@ -161,7 +166,6 @@ class MappingSession {
   AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
   EventFusionOptions options_;  // `automatic`: the options that are still to be chosen
   PoseSourceSelector pose_source_;
-  LiveGuard guard_;
   FusionMapper mapper_;
   MapperCounts earlier_counts_;            // counts of the mappers before clock resets
   std::unique_ptr<FirstLook> first_look_;  // set in playback until options are chosen
@@ -181,6 +185,10 @@ class MappingSession {
   std::set<std::size_t> left_out_;
   // Stated noise of the poses of each source, by the times of the poses.
   std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
+  std::optional<std::variant<Jump, ClockReset>> break_;  // the input goes on behind it
+  std::map<int, Missing> missing_;                       // by camera
+  LiveStatus live_;                                      // its breaks, rejected poses
+  std::optional<std::int64_t> newest_pose_ns_;           // of the selected source
   bool finished_ = false;
   bool keyframe_lost_ = false;  // the last call of `next` made a keyframe and threw
   bool all_refined_ = false;

@@ -7,15 +7,17 @@
 
 namespace efm {
 
-std::vector<PoseSample> PoseIntake::add(PoseSample pose) {
+bool PoseIntake::isPossible(const PoseSample& pose) {
   const Rigid3 T_world_rig = pose.T_world_rig();
-  const bool possible = pose.t_ns <= kEndOfTimeNs && pose.t_ns >= -kEndOfTimeNs &&
-                        T_world_rig.translation.allFinite() &&
-                        T_world_rig.rotation.coeffs().allFinite();
+  return pose.t_ns <= kEndOfTimeNs && pose.t_ns >= -kEndOfTimeNs &&
+         T_world_rig.translation.allFinite() && T_world_rig.rotation.coeffs().allFinite();
+}
+
+std::vector<PoseSample> PoseIntake::add(PoseSample pose) {
   std::vector<PoseSample> right;
   Stream& stream = streams_[pose.source];
   const Event time{pose.t_ns, 0, 0, false};
-  if (!possible || stream.checker.pass(time)) {
+  if (!isPossible(pose) || stream.checker.pass(time)) {
     right.push_back(std::move(pose));
   } else if (stream.checker.add(time, 0) == EventChecker::Verdict::kLate) {
     stream.checker.follow(pose.t_ns);  // the tracker's clock may have gone back

@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/events/event_checker.h"
@@ -21,6 +22,9 @@ namespace efm {
 /// those that wait are wrong. The session rejects older poses.
 class PoseIntake {
  public:
+  PoseIntake() = default;
+  /// Returns whether the session can use a pose of any time: it is finite, its time is in range.
+  static bool isPossible(const PoseSample& pose);
   /// @return the poses that are right, of this call and of earlier ones.
   std::vector<PoseSample> add(PoseSample pose);
   /// Tells the time of a camera's newest event, on the clock of the poses.
@@ -29,11 +33,17 @@ class PoseIntake {
   /// Ends the waiting.
   std::vector<PoseSample> finish();
 
+  /// Begins anew, but for the counts: the clock went back.
+  void forget() { *this = PoseIntake(wrong_poses_, std::move(first_wrong_)); }
+
   /// Returns the number of poses with a wrong time, and what is wrong with the first.
   std::uint64_t wrongPoses() const { return wrong_poses_; }
   const std::string& firstWrong() const { return first_wrong_; }
 
  private:
+  PoseIntake(std::uint64_t wrong_poses, std::string first_wrong)
+      : wrong_poses_(wrong_poses), first_wrong_(std::move(first_wrong)) {}
+
   struct Stream {
     EventChecker checker = EventChecker({kFarAheadNs, kFarAheadNs});
     std::deque<PoseSample> waiting;

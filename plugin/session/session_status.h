@@ -125,6 +125,7 @@ std::string asText(const DroppedWindows& windows);
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
+  std::uint64_t late_events = 0;   ///< Rejected: over 10 ms older than their camera's newest one.
   std::uint64_t pose_jumps = 0;    ///< Tracker jumps; each begins a new segment of poses.
   std::uint64_t clock_resets = 0;  ///< Clock resets; each starts the mapping again.
   /// Rejected poses: over a second older than the newest one; ahead of the poses before and after;

@@ -153,7 +153,7 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
           {"cameras", cameras},
           {"windows_given_up", counts.dropped_windows.total()},
           {"windows_given_up_for", asJson(counts.dropped_windows)},
-          {"late_events", counts.late_events},
+          {"late_events", live.late_events},
           {"pose_jumps", live.pose_jumps},
           {"clock_steps", live.clock_resets},
           {"refused_poses", live.rejected_poses},

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <functional>
 
-#include "plugin/session/mapper_core.h"
+#include "plugin/session/mapper_driver.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -32,7 +32,7 @@ struct Host {
   void addPoses(const SyntheticRecording& recording) {
     for (const StampedPose& pose : recording.poses) mapper->addPose(pose);
   }
-  std::size_t keyframes() const { return mapper->core().numKeyframes(); }
+  std::size_t keyframes() const { return mapper->driver().newest(false)->keyframes.size(); }
 
   std::shared_ptr<Mapper> mapper;
   RigFromPackets packets;

@@ -11,7 +11,7 @@
 #include <future>
 #include <map>
 
-#include "test/plugin/session/mapper_driver.h"
+#include "test/plugin/session/mapper_of_rig.h"
 
 namespace efm {
 namespace {
@@ -43,7 +43,7 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
   ASSERT_EQ(map->trajectory.size(), 11U);
   expectSameMap(*map, *expected);
   ASSERT_EQ(map->keyframes.size(), 4U);
-  EXPECT_EQ(mapper.core().numKeyframes(), 4U);
+  EXPECT_EQ(mapper.driver().newest(false)->keyframes.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) {
     const StoredKeyframe& keyframe = map->keyframes[i];
     const StoredKeyframe& other = expected->keyframes[7 + i];
@@ -51,7 +51,8 @@ TEST(LiveMapper, MakesTheMapOfPlaybackInGrowingSnapshotsWithTheNewestKeyframes) 
     EXPECT_TRUE(isSame(keyframe.T_world_ref, other.T_world_ref));
     EXPECT_EQ(keyframe.points->size(), other.points->size());
   }
-  EXPECT_EQ(cv::norm(mapper.core().newestDepth().first, playback.core().newestDepth().first), 0);
+  EXPECT_EQ(cv::norm(mapper.driver().newestDepth().first, playback.driver().newestDepth().first),
+            0);
   const SessionStatus status = mapper.status();
   expectSumsAgree(status);
   EXPECT_EQ(status.live->dropRatio(), 0);
@@ -146,7 +147,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   }
   ASSERT_LT(i, samples.size());
   for (; i < samples.size(); ++i) mapper.add(samples[i]);  // while the mapping is blocked
-  EXPECT_GE(mapper.core().numKeyframes(), 1U);
+  EXPECT_GE(mapper.driver().newest(false)->keyframes.size(), 1U);
   EXPECT_FALSE(mapper.points()->empty());
   const SessionStatus before = mapper.status();
   EXPECT_LE(before.live->cameras.at(0).queued + before.live->cameras.at(1).queued, 2500U);
@@ -175,7 +176,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   for (const std::int64_t newest_s : {590, 610}) {
     SessionOfRig session(live());
     addPoses(session, recording);
-    session.addPose(sampleOf(at(newest_s + 2)));
+    session.add(sampleOf(at(newest_s + 2)));
     EXPECT_FALSE(session.next());
     addEvents(session, recording);
     EXPECT_EQ(mapRest(session).size(), newest_s > 600 ? 0U : 11U);
@@ -185,10 +186,10 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
   SessionOfRig session(live());
   for (std::int64_t ago_s = 7200; ago_s > 0; --ago_s) {
-    session.addPose(sampleOf(at(ago_s == 5000 ? 4980 : -ago_s), wheels));
+    session.add(sampleOf(at(ago_s == 5000 ? 4980 : -ago_s), wheels));
     EXPECT_FALSE(session.next());
   }
-  for (const StampedPose& pose : recording.poses) session.addPose(sampleOf(pose, wheels));
+  for (const StampedPose& pose : recording.poses) session.add(sampleOf(pose, wheels));
   addEvents(session, recording);
   EXPECT_EQ(mapRest(session).size(), 11U);
   // Poses wait 600 s. The last pose without events was at 1 s before the start.
@@ -358,9 +359,9 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
       }
       fed[packet->camera] += events.size();
       if (fault == kPaused) {
-        mapper.core().skip(packet->camera, events);
+        mapper.driver().skip(packet->camera, events);
       } else {
-        messageOf([&] { mapper.core().addEvents(packet->camera, events, until_ns); });
+        messageOf([&] { mapper.driver().addEvents(packet->camera, events, until_ns); });
       }
     }
   }

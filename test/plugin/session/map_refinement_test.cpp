@@ -352,24 +352,24 @@ TEST(StatedNoise, CountsOnlyOfTheFirstPoseOfATimeAndItsSource) {
   const PoseNoise wrong{0.5, 0.5};
   const auto map = [&](const Noise& first, const Noise& others) {
     return mapWith(noiseOptions(), [&](auto& session, const auto& pose, std::size_t i) {
-      session.addPose(sampleOf(pose, {}, i == 0 ? first : others));
+      session.add(sampleOf(pose, {}, i == 0 ? first : others));
     });
   };
   const PoseNoise certain{1e-4, 1e-5};
   const auto expected = map(certain, certain);
   const auto twice = mapWith(noiseOptions(), [&](auto& session, StampedPose pose, std::size_t) {
-    session.addPose(sampleOf(pose, {}, certain));
+    session.add(sampleOf(pose, {}, certain));
     pose.T_world_rig.translation.z() += 1;
-    session.addPose(sampleOf(pose, {}, wrong));
+    session.add(sampleOf(pose, {}, wrong));
   });
   expectSameMap(*twice, *expected);
   EventFusionOptions options = noiseOptions();
   options.rig.pose_source = "tracker";
   const PoseSourceId tracker{PoseKind::kPose, "tracker"};
   const auto beside = mapWith(options, [&](auto& session, const auto& pose, std::size_t i) {
-    session.addPose(
+    session.add(
         sampleOf(pose, {i % 2 == 0 ? PoseKind::kPose : PoseKind::kOdometry, "other"}, wrong));
-    session.addPose(sampleOf(pose, tracker, certain));
+    session.add(sampleOf(pose, tracker, certain));
   });
   expectSameMap(*beside, *expected);
   expectSameMap(*map(wrong, std::nullopt), *map(std::nullopt, std::nullopt));
@@ -384,7 +384,7 @@ TEST_P(RefinedSession, AKeyframeThatTheMapOrTheRefinementRejectsDoesNotShiftTheO
     const std::int64_t window = (pose.t_ns - SyntheticRecording::kStartNs) / kShakenWindowNs;
     if (window == 5) pose.T_world_rig.translation.z() += 1e18;  // here, voxels have no numbers
     const PoseNoise noise{window == 8 ? std::nan("") : 0.01, 0.005};
-    session.addPose(sampleOf(pose, {}, noise));
+    session.add(sampleOf(pose, {}, noise));
   }
   addEvents(session, recording);
   session.finish();

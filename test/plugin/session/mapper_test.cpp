@@ -10,7 +10,7 @@
 
 #include "plugin/session/host_text.h"
 #include "test/memory/failing_allocation.h"
-#include "test/plugin/session/mapper_driver.h"
+#include "test/plugin/session/mapper_of_rig.h"
 
 namespace efm {
 namespace {
@@ -286,7 +286,7 @@ TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
       fed += numEvents(samples[i]);
       const auto* const packet = std::get_if<EventPacket>(&samples[i]);
       if (packet != nullptr && i >= 450 && i < 750) {
-        mapper.core().skip(packet->camera, packet->events.all());
+        mapper.driver().skip(packet->camera, packet->events.all());
       } else if (at_once) {
         mapper.add(samples[i]);
       } else {
@@ -347,7 +347,7 @@ TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
   Mapper::Callbacks callbacks;
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
     ++calls;
-    EXPECT_EQ(mapper->core().runsHere(), isLive());
+    EXPECT_EQ(mapper->driver().runsHere(), isLive());
     if (isLive()) {
       EXPECT_THROW(mapper->finish(), std::logic_error) << "it would wait for itself";
     }
@@ -422,7 +422,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
     };
     callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
       EXPECT_EQ(madeKeyframes(), ++keyframes) << "the next one is made later";
-      EXPECT_TRUE(isLive() || mapper->core().numKeyframes() == keyframes);
+      EXPECT_TRUE(isLive() || mapper->driver().newest(false)->keyframes.size() == keyframes);
       ++thrown;
       throw std::runtime_error("keyframe " + std::to_string(keyframes));
     };
@@ -470,14 +470,14 @@ TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
   Mapper::Callbacks callbacks;
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) { ++delivered; };
   MapperOfRig mapper(in(syntheticOptions()), callbacks);
-  mapper.core().setSink(&disk);
+  mapper.driver().setSink(&disk);
   const std::size_t errors = addAll<std::runtime_error>(mapper, samples);
   if (!isLive()) {
     EXPECT_GT(errors, 10U) << "each sample tries the window again";
     EXPECT_EQ(delivered, 1U);
     EXPECT_EQ(mapper.snapshot()->trajectory.size(), 1U);
     EXPECT_EQ(mapper.status().counts.keyframes, 1U);
-    mapper.core().setSink(nullptr);
+    mapper.driver().setSink(nullptr);
   }
   mapper.finish();
   const auto expected = mapOf(syntheticOptions(), samples);
@@ -513,7 +513,7 @@ TEST_P(MapperInEitherMode, IfMemoryEndsKeyframesAndPointsStayConsistent) {
       if (sink.keyframes == 2) allocations = stopFailing();
     };
     MapperOfRig mapper(options, callbacks);
-    mapper.core().setSink(&sink);
+    mapper.driver().setSink(&sink);
     std::size_t errors = addAll<std::bad_alloc>(mapper, samples);
     mapper.finish();
     stopFailing();
@@ -560,10 +560,10 @@ TEST_P(MapperInEitherMode, QueriesAreAnsweredDuringASweepInLiveOperationAlone) {
   QueryingSink sink;
   MapperOfRig mapper(in(syntheticOptions()));
   sink.queries = {[&] { mapper.status(); }, [&] { mapper.points(); }, [&] { mapper.keyframes(); },
-                  [&] { mapper.core().numKeyframes(); }};
-  if (isLive()) sink.queries.emplace_back([&] { mapper.core().skip(0, {}); });
+                  [&] { mapper.driver().newest(false); }};
+  if (isLive()) sink.queries.emplace_back([&] { mapper.driver().skip(0, {}); });
   if (isLive()) sink.patience = std::chrono::seconds(60);
-  mapper.core().setSink(&sink);
+  mapper.driver().setSink(&sink);
   play(mapper, samplesOf(SyntheticRecording()));
   sink.answers.clear();  // waits for the query threads
   EXPECT_EQ(sink.answered, isLive() ? sink.queries.size() : 0U);
@@ -617,7 +617,7 @@ TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
       while (!done) {
         expectConsistent(*mapper.snapshot(), options.cloud);
         mapper.status();
-        mapper.core().newestDepth();
+        mapper.driver().newestDepth();
       }
     });
     for (std::thread& feeder : feeders) feeder.join();
@@ -625,7 +625,7 @@ TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
     done = true;
     querier.join();
     EXPECT_EQ(delivered, 8U);
-    EXPECT_EQ(mapper.core().numKeyframes(), delivered);
+    EXPECT_EQ(mapper.driver().newest(false)->keyframes.size(), delivered);
     expectSameMap(*mapper.snapshot(), *expected);
   }
 }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "plugin/session/gate.h"
 #include "plugin/session/mapping_session.h"
 #include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/synthetic_recording.h"
@@ -20,9 +21,49 @@ namespace efm {
 struct SessionOfRig : MappingSession {
   explicit SessionOfRig(const EventFusionOptions& options, int num_cameras = 2)
       : MappingSession(options) {
-    addCameras(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
-                          options.rig.time_offsets_ns));
+    add(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
+                   options.rig.time_offsets_ns));
   }
+};
+
+/// A session behind a gate, as in live operation, in one thread.
+struct LiveSession : MappingSession {
+  explicit LiveSession(const EventFusionOptions& options, int num_cameras = 2)
+      : MappingSession(options), gate(options.live) {
+    gate.add(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
+                        options.rig.time_offsets_ns));
+  }
+
+  template <typename One>
+  void add(One one) {
+    gate.add(std::move(one));
+    if (takes) take();
+  }
+  /// Takes and maps what waits, one by one.
+  void take() {
+    while (std::optional<Input> input = gate.take(eventsCompleteNs())) {
+      try {
+        MappingSession::add(std::move(*input));
+      } catch (const std::invalid_argument&) {  // a pose that is not valid
+        ++rejected;
+      }
+      map();
+    }
+  }
+  void finish() {
+    gate.end();
+    take();
+    MappingSession::finish();
+    map();
+  }
+  void map() {
+    while (auto keyframe = next()) made.push_back(std::move(*keyframe));
+  }
+
+  Gate gate;
+  bool takes = true;  ///< False: a machine that is busy.
+  std::uint64_t rejected = 0;
+  std::vector<KeyframeDepthMap> made;
 };
 
 /// Returns all events of a camera in one packet.
@@ -55,13 +96,15 @@ inline PoseSample sampleOf(const StampedPose& pose, const PoseSourceId& source =
   return {source, pose.t_ns, pose.T_world_rig, {}, noise};
 }
 
-inline void addPoses(MappingSession& session, const SyntheticRecording& recording) {
-  for (const StampedPose& pose : recording.poses) session.addPose(sampleOf(pose));
+template <typename Session>
+void addPoses(Session& session, const SyntheticRecording& recording) {
+  for (const StampedPose& pose : recording.poses) session.add(sampleOf(pose));
 }
 
-inline void addEvents(MappingSession& session, const SyntheticRecording& recording) {
+template <typename Session>
+void addEvents(Session& session, const SyntheticRecording& recording) {
   for (int c = 0; c < static_cast<int>(recording.cameras.size()); ++c) {
-    session.addEvents(packetOf(recording, c));
+    session.add(packetOf(recording, c));
   }
 }
 
@@ -71,14 +114,19 @@ inline std::vector<KeyframeDepthMap> mapDue(MappingSession& session) {
   return keyframes;
 }
 
-inline std::vector<KeyframeDepthMap> mapRest(MappingSession& session) {
+inline std::vector<KeyframeDepthMap> mapDue(LiveSession& session) {
+  return std::exchange(session.made, {});
+}
+
+template <typename Session>
+std::vector<KeyframeDepthMap> mapRest(Session& session) {
   session.finish();
   return mapDue(session);
 }
 
 /// Adds all poses, then the events of each camera in one packet. @return all keyframes.
-inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
-                                            const SyntheticRecording& recording) {
+template <typename Session>
+std::vector<KeyframeDepthMap> mapAll(Session& session, const SyntheticRecording& recording) {
   addPoses(session, recording);
   addEvents(session, recording);
   return mapRest(session);
@@ -86,13 +134,13 @@ inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
 
 /// Adds packets of `packet_ms`, the last camera's first, and maps after each time step.
 /// @return the keyframes that were made before the end of the input.
-inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
-                                                   const SyntheticRecording& recording,
-                                                   int packet_ms) {
+template <typename Session>
+std::vector<KeyframeDepthMap> mapUnfinished(Session& session, const SyntheticRecording& recording,
+                                            int packet_ms) {
   std::vector<KeyframeDepthMap> keyframes;
   std::vector<std::size_t> begin(recording.cameras.size(), 0);
   for (std::size_t p = 0; p < recording.poses.size(); ++p) {
-    session.addPose(sampleOf(recording.poses[p]));
+    session.add(sampleOf(recording.poses[p]));
     const std::int64_t until_ns = recording.poses[p].t_ns;
     const bool last = p + 1 == recording.poses.size();
     const std::int64_t passed_ms = (until_ns - SyntheticRecording::kStartNs) / 1'000'000;
@@ -103,8 +151,8 @@ inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
       for (; begin[c] < events.size() && (last || events[begin[c]].t_ns < until_ns); ++begin[c]) {
         part.push_back(events[begin[c]]);
       }
-      session.addEvents({static_cast<int>(c), CheckedEvents(std::move(part)),
-                         last ? std::nullopt : std::optional(until_ns)});
+      session.add(EventPacket{static_cast<int>(c), CheckedEvents(std::move(part)),
+                              last ? std::nullopt : std::optional(until_ns)});
     }
     std::vector<KeyframeDepthMap> made = mapDue(session);
     std::move(made.begin(), made.end(), std::back_inserter(keyframes));
@@ -112,8 +160,8 @@ inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
   return keyframes;
 }
 
-inline void mapPiecewise(MappingSession& session, const SyntheticRecording& recording,
-                         int packet_ms) {
+template <typename Session>
+void mapPiecewise(Session& session, const SyntheticRecording& recording, int packet_ms) {
   mapUnfinished(session, recording, packet_ms);
   mapRest(session);
 }

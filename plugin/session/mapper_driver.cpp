@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/mapper_driver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/session/live_mapper.h"
+#include "plugin/session/playback_mapper.h"
+
+namespace efm {
+namespace {
+
+std::vector<float> depthsIn(const cv::Mat1f& depth) {
+  std::vector<float> depths_m;
+  std::copy_if(depth.begin(), depth.end(), std::back_inserter(depths_m),
+               [](float depth_m) { return depth_m > 0; });
+  return depths_m;
+}
+
+/// Returns why an ended input made no keyframe. @return std::nullopt if it made one.
+std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapperOptions& options) {
+  if (state.counts.keyframes > 0) return std::nullopt;
+  return Warning{"no-keyframe",
+                 fmt::format("there is no keyframe: {}", whyNoKeyframe(state, options).what())};
+}
+
+}  // namespace
+
+std::shared_ptr<MapperDriver> MapperDriver::make(const EventFusionOptions& options,
+                                                 Callbacks callbacks,
+                                                 const std::vector<StoredKeyframe>& earlier) {
+  if (options.live.enabled) return LiveMapper::make(options, std::move(callbacks), earlier);
+  return std::make_shared<PlaybackMapper>(options, std::move(callbacks), earlier);
+}
+
+MapperDriver::MapperDriver(const EventFusionOptions& options, Callbacks callbacks,
+                           const std::vector<StoredKeyframe>& earlier)
+    : options_(options),
+      callbacks_(std::move(callbacks)),
+      setup_(readRigSetup(options.rig.calibration, options.rig.hand_eye)),
+      session_(options),
+      statistics_(statisticsOptions(options)) {
+  for (const StoredKeyframe& keyframe : earlier) {
+    session_.insertEarlier(pointsInWorld(*keyframe.points, keyframe.T_world_ref),
+                           keyframe.T_world_ref);
+    keep(keyframe);
+  }
+}
+
+// --- Input ---
+
+int MapperDriver::addCamera(const RigCamera& camera) {
+  camera.validate();
+  const std::lock_guard<std::mutex> lock(cameras_mutex_);
+  if (rig_is_fixed_) throw std::logic_error("a camera was added after the first events");
+  given_rig_.cameras.push_back(camera);
+  return static_cast<int>(given_rig_.cameras.size()) - 1;
+}
+
+void MapperDriver::addCameras(const Rig& rig) {
+  const std::lock_guard<std::mutex> lock(cameras_mutex_);
+  if (!given_rig_.cameras.empty()) {
+    const std::vector<RigCamera>& given = given_rig_.cameras;
+    if (!std::equal(given.begin(), given.end(), rig.cameras.begin(), rig.cameras.end(),
+                    [](const RigCamera& a, const RigCamera& b) { return isSame(a, b); })) {
+      throw std::invalid_argument("the cameras differ from those that were added before");
+    }
+  }
+  if (!rig_is_fixed_) fixRig(rig);
+}
+
+/// Gives the cameras to the session. @throws std::invalid_argument if they do not fit the options.
+void MapperDriver::fixRig(const Rig& given) {
+  const Rig rig = calibrated(given, setup_, options_.rig.time_offsets_ns);
+  requireMappable(rig, options_);
+  useRig(rig);
+  given_rig_ = given;
+  rig_is_fixed_ = true;
+  const std::lock_guard<std::mutex> lock(statistics_mutex_);
+  statistics_.setCameras(rig, {});
+}
+
+void MapperDriver::addEvents(int camera, std::vector<Event> events,
+                             std::optional<std::int64_t> complete_until_ns) {
+  {
+    const std::lock_guard<std::mutex> lock(cameras_mutex_);
+    if (static_cast<std::size_t>(camera) >= given_rig_.cameras.size()) {
+      throw std::invalid_argument(
+          fmt::format("events of camera {}: there are {} cameras: expected a camera that was added",
+                      camera, given_rig_.cameras.size()));
+    }
+    if (!rig_is_fixed_) fixRig(given_rig_);
+  }
+  useEvents(camera, std::move(events), complete_until_ns);
+}
+
+void MapperDriver::add(Sample sample) {
+  if (auto* const packet = std::get_if<EventPacket>(&sample)) {
+    {
+      const std::lock_guard<std::mutex> lock(cameras_mutex_);
+      if (!rig_is_fixed_ || std::size_t(packet->camera) >= given_rig_.cameras.size()) {
+        throw std::invalid_argument(
+            fmt::format("a packet of camera {}: expected addCameras(recording.rig()) before it",
+                        packet->camera));
+      }
+    }
+    usePacket(std::move(*packet));
+  } else if (auto* const pose = std::get_if<PoseSample>(&sample)) {
+    if (setup_.T_body_rig) pose->T_body_rig = *setup_.T_body_rig;
+    usePose(std::move(*pose));
+  }
+}
+
+void MapperDriver::setSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  sink_ = sink;
+}
+
+void MapperDriver::setClock(ProcessorClock clock) {
+  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  clock_ = std::move(clock);
+}
+
+// --- Mapping ---
+
+void MapperDriver::feed(Input input) {
+  std::optional<PoseSample> pose;
+  if (const auto* const of_tracker = std::get_if<PoseSample>(&input)) pose = *of_tracker;
+  session_.add(std::move(input));
+  if (!pose) return;
+  const std::lock_guard<std::mutex> lock(statistics_mutex_);
+  statistics_.addPose(*pose);
+}
+
+std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
+  DsiSink* sink = nullptr;
+  ProcessorClock clock;
+  {
+    const std::lock_guard<std::mutex> lock(newest_mutex_);
+    sink = sink_;
+    clock = clock_;
+  }
+  const std::size_t kept = map_so_far_.trajectory.size();
+  const std::size_t kept_keyframes = map_so_far_.keyframes.size();
+  const auto store = [this](const KeyframeDepthMap& made, const std::vector<ViewPoint>& points) {
+    keep({made.window.t_ref_ns, made.T_world_ref,
+          std::make_shared<const std::vector<ViewPoint>>(points)});
+  };
+  std::optional<KeyframeDepthMap> keyframe;
+  try {
+    keyframe = session_.next(sink, clock, store);
+  } catch (...) {  // the session does not have this keyframe
+    map_so_far_.trajectory.resize(kept);
+    map_so_far_.tracker_trajectory.resize(std::min(map_so_far_.tracker_trajectory.size(), kept));
+    map_so_far_.keyframes.resize(std::min(map_so_far_.keyframes.size(), kept_keyframes));
+    throw;
+  }
+  if (!keyframe) return keyframe;
+  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  newest_depth_ = keyframe->map.depth;
+  pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
+  newest_planes_ = session_.chosen().planes;
+  return keyframe;
+}
+
+/// Adds a keyframe to the map so far. If memory runs out, the caller removes the keyframe.
+void MapperDriver::keep(StoredKeyframe keyframe) {
+  const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
+  map_so_far_.trajectory.push_back(pose);
+  map_so_far_.tracker_trajectory.push_back(pose);
+  map_so_far_.keyframes.push_back(std::move(keyframe));
+}
+
+std::shared_ptr<MapSnapshot> MapperDriver::makeSnapshot(bool with_points) {
+  session_.applyPending();
+  const std::vector<Rigid3>& T_world_ref = session_.T_world_ref();
+  std::vector<StampedPose>& trajectory = map_so_far_.trajectory;
+  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+  const std::size_t earlier = trajectory.size() - T_world_ref.size();
+  const std::size_t forgotten = trajectory.size() - keyframes.size();
+  for (std::size_t i = earlier; i < trajectory.size(); ++i) {
+    if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
+    trajectory[i].T_world_rig = T_world_ref[i - earlier];
+    if (i >= forgotten) keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
+  }
+  for (const std::size_t left_out : session_.leftOut()) {
+    if (earlier + left_out < forgotten) continue;
+    keyframes[earlier + left_out - forgotten].points =
+        std::make_shared<const std::vector<ViewPoint>>();
+  }
+  auto map = std::make_shared<MapSnapshot>(map_so_far_);
+  if (with_points) map->points = session_.cloud().points();
+  return map;
+}
+
+// --- Results ---
+
+std::pair<cv::Mat1f, DepthPlanesOptions> MapperDriver::newestDepth() const {
+  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  return {newest_depth_, newest_planes_};
+}
+
+std::vector<Warning> MapperDriver::warnings() {
+  const bool ended = hasEnded();
+  PixelSizes pixels;
+  {
+    const std::lock_guard<std::mutex> lock(newest_mutex_);
+    pixels = pixel_sizes_;
+  }
+  const FusionMapperOptions options = usedOptions();
+  const SessionStatus state = status();
+  RecordingStatistics statistics;
+  {
+    const std::lock_guard<std::mutex> lock(statistics_mutex_);
+    statistics = statistics_;
+  }
+  Findings findings{statistics, {}};
+  describeInput(findings.read);
+  findings.use(options.keyframe.planes, state.chosen);
+  findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
+  findings.checks = options_.checks;
+  findings.session = &state;
+  findings.options = &options;
+  findings.voxel_size_m = cloudOptions().voxel_size_m;
+  if (ended) findings.pixels = &pixels;
+  std::vector<Warning> warnings = warningsOf(findings);
+  double reach_m = 4 * options.keyframe.planes.max_depth_m;  // of points around the keyframes
+  const auto map = newest(false);
+  for (const StampedPose& pose : map->trajectory) {
+    reach_m = std::max(reach_m, pose.T_world_rig.translation.cwiseAbs().maxCoeff() +
+                                    4 * options.keyframe.planes.max_depth_m);
+  }
+  if (ended && coarseStepAt(reach_m, findings.voxel_size_m)) {  // only then is the map exported
+    if (auto far = farPointsWarning(*newest(true)->points, findings.voxel_size_m)) {
+      warnings.push_back(std::move(*far));
+    }
+  }
+  const auto no_keyframe = ended ? noKeyframe(state, options) : std::nullopt;
+  if (no_keyframe) warnings.insert(warnings.begin(), *no_keyframe);
+  return warnings;
+}
+
+std::vector<std::string> MapperDriver::warningsOfSilence(const KeyframeDepthMap& keyframe) {
+  std::vector<std::string> warnings;
+  for (const int camera : keyframe.silent_cameras) {
+    if (!silent_cameras_.insert(camera).second) continue;
+    warnings.push_back(fmt::format("camera {} had no event for the keyframe at {} s", camera,
+                                   formatSeconds(keyframe.window.t_ref_ns)));
+  }
+  return warnings;
+}
+
+MapperDriver::News MapperDriver::takeNews() {
+  News news;
+  const std::uint64_t choices = session_.chosen().choices;
+  const bool is_new_choice = std::exchange(told_choices_, choices) != choices;
+  const bool is_first_blur = session_.correctedKeyframes() > 0 && !std::exchange(blur_told_, true);
+  if (is_new_choice) news.choice = session_.status();
+  if (is_first_blur) {
+    news.blur = session_.status();
+    news.options = session_.usedOptions();
+  }
+  return news;
+}
+
+void MapperDriver::tell(const News& news, const Say& say) const {
+  if (news.blur) say(callbacks_.info, motionText(*news.blur, news.options));
+  if (!news.choice) return;
+  const SessionStatus& status = *news.choice;
+  say(callbacks_.info, choiceText(status));
+  for (const Warning& note : status.pose_notes) say(callbacks_.info, note.name + ": " + note.text);
+  std::vector<Warning> warnings = status.pose_warnings;
+  if (status.scene_unknown && status.events && status.poses) warnings.push_back(noSceneWarning());
+  for (const Warning& warning : warnings) say(callbacks_.warn, warning.name + ": " + warning.text);
+}
+
+void MapperDriver::tellOfEnd(const Say& say) {
+  if (const auto warning = noKeyframe(status(), usedOptions())) {
+    say(callbacks_.warn, warning->name + ": " + warning->text);
+  }
+  for (const Warning& warning : warnings()) {
+    if (warning.name == "poses-blur" || warning.name == "far-coordinates" ||
+        warning.name == "voxel-size" || warning.name == "skipped-events" ||
+        warning.name == "skipped-poses") {
+      say(callbacks_.warn, warning.name + ": " + warning.text);
+    }
+  }
+  const MapQuality quality = status().quality;
+  if (quality.word == QualityWord::kUnknown) return;
+  say(callbacks_.info, "quality: " + textOf(quality));
+}
+
+}  // namespace efm

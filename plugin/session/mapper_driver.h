@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "event_fusion/engine.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/cloud/map_point.h"
+#include "plugin/recordings/streams/sample.h"
+#include "plugin/session/health_checks.h"
+#include "plugin/session/mapping_session.h"
+#include "plugin/session/recording_statistics.h"
+
+namespace efm {
+
+/// What is behind a Mapper: a session, its results so far, and the host's callbacks. PlaybackMapper
+/// maps in the caller's thread, LiveMapper in a thread of its own. Functions without a comment are
+/// those of Mapper. If the keyframe cannot be stored, its window is dropped.
+class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
+ public:
+  using Callbacks = Mapper::Callbacks;
+
+  /// Makes the driver for the options. Its callbacks may drop the last reference to it: it ends
+  /// after the callback.
+  static std::shared_ptr<MapperDriver> make(const EventFusionOptions& options, Callbacks callbacks,
+                                            const std::vector<StoredKeyframe>& earlier);
+  virtual ~MapperDriver() = default;
+  MapperDriver(const MapperDriver&) = delete;
+  MapperDriver& operator=(const MapperDriver&) = delete;
+
+  int addCamera(const RigCamera& camera);
+  void addCameras(const Rig& rig);
+  /// @param complete_until_ns see EventPacket.
+  void addEvents(int camera, std::vector<Event> events,
+                 std::optional<std::int64_t> complete_until_ns = std::nullopt);
+  void add(Sample sample);
+  /// Counts events that are not to be mapped. The windows that need them are dropped.
+  virtual void skip(int camera, const std::vector<Event>& events) = 0;
+  virtual void finish() = 0;
+  virtual void stop() = 0;
+  /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
+  virtual bool runsHere() const { return false; }
+  /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
+  /// The current keyframe may still use the former sink.
+  void setSink(DsiSink* sink);
+  /// Tells what a first look of the host found.
+  virtual void setFacts(QualityFacts facts) = 0;
+  /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
+  /// processor time of the process.
+  void setClock(ProcessorClock clock);
+
+  /// Returns the files of the rig that the options name.
+  const RigSetup& setup() const { return setup_; }
+  virtual SessionStatus status() const = 0;
+  std::vector<Warning> warnings();
+  virtual std::shared_ptr<const MapSnapshot> newest(bool with_points) = 0;
+  /// Returns the options of the map, with the chosen voxel size.
+  virtual GlobalCloudOptions cloudOptions() const = 0;
+  /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
+
+ protected:
+  MapperDriver(const EventFusionOptions& options, Callbacks callbacks,
+               const std::vector<StoredKeyframe>& earlier);
+
+  // Functions of the driver's two kinds.
+  /// Gives the cameras to the session, or to the gate before it.
+  virtual void useRig(const Rig& rig) = 0;
+  virtual void useEvents(int camera, std::vector<Event> events,
+                         std::optional<std::int64_t> complete_until_ns) = 0;
+  virtual void usePacket(EventPacket packet) = 0;
+  virtual void usePose(PoseSample pose) = 0;
+  virtual FusionMapperOptions usedOptions() const = 0;
+  /// Returns what the check of own data has found.
+  virtual void describeInput(RecordingCounts& /*counts*/) const {}
+  virtual bool hasEnded() const = 0;
+
+  // Functions for the thread that maps. The caller has locked the session.
+  /// Adds input to the session.
+  void feed(Input input);
+  /// Maps the next window. After an exception the map so far is as before.
+  std::optional<KeyframeDepthMap> mapWindow();
+  /// Makes a snapshot. Moves cloud and keyframes to their refined poses before, so that they agree.
+  std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
+  virtual void keep(StoredKeyframe keyframe);
+  /// Returns at most one warning per camera. The status counts the keyframes without its events.
+  std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
+
+  /// What the log says of a new choice of options, and of the first blur.
+  struct News {
+    std::optional<SessionStatus> choice, blur;
+    FusionMapperOptions options;
+  };
+  News takeNews();
+  /// Tells the host. @param say calls a callback of the log.
+  using Say =
+      std::function<void(const std::function<void(const std::string&)>&, const std::string&)>;
+  void tell(const News& news, const Say& say) const;
+  /// Tells the host of an input that made no keyframe or whose poses blur the events, and how good
+  /// the map is.
+  void tellOfEnd(const Say& say);
+
+  const EventFusionOptions options_;
+  const Callbacks callbacks_;
+  const RigSetup setup_;
+  MappingSession session_;
+  MapSnapshot map_so_far_;               // without points
+  mutable std::mutex cameras_mutex_;     // guards given_rig_ and rig_is_fixed_
+  Rig given_rig_;                        // as the host gave it
+  bool rig_is_fixed_ = false;            // the session knows the cameras
+  mutable std::mutex statistics_mutex_;  // guards statistics_; held for copies only
+  RecordingStatistics statistics_;       // of the poses, and in playback of added events
+
+ private:
+  void fixRig(const Rig& given);
+
+  std::set<int> silent_cameras_;  // cameras without events that were logged
+  std::uint64_t told_choices_ = 0;
+  bool blur_told_ = false;
+
+  mutable std::mutex newest_mutex_;  // guards the members below; held for copies only
+  DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
+  PixelSizes pixel_sizes_;
+  cv::Mat1f newest_depth_;
+  DepthPlanesOptions newest_planes_;
+};
+
+}  // namespace efm

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "mapping/events/event_checker.h"
+#include "plugin/session/mapper_driver.h"
+#include "plugin/session/pose_intake.h"
+
+namespace efm {
+
+/// A mutex whose threads take turns: one that locks it again and again does not keep others out.
+class TurnMutex {
+ public:
+  void lock() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const std::uint64_t turn = next_++;
+    changed_.wait(lock, [&] { return turn == now_; });
+  }
+  void unlock() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++now_;
+    }
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t next_ = 0, now_ = 0;
+};
+
+/// Maps in the caller's thread. If a window cannot be mapped (no memory, a sink that throws), the
+/// next call tries it again. A query waits while a keyframe is made, but not while it is delivered.
+/// If several threads add samples, keyframes may be delivered at the same time. Within a callback
+/// `add` and `finish` only take the input: the caller of the callback maps it.
+class PlaybackMapper : public MapperDriver {
+ public:
+  PlaybackMapper(const EventFusionOptions& options, Callbacks callbacks,
+                 const std::vector<StoredKeyframe>& earlier)
+      : MapperDriver(options, std::move(callbacks), earlier) {}
+
+  void skip(int camera, const std::vector<Event>& events) override;
+  void finish() override;
+  void stop() override;
+  void setFacts(QualityFacts facts) override;
+  SessionStatus status() const override;
+  std::shared_ptr<const MapSnapshot> newest(bool with_points) override;
+  GlobalCloudOptions cloudOptions() const override;
+
+ protected:
+  void useRig(const Rig& rig) override;
+  void useEvents(int camera, std::vector<Event> events,
+                 std::optional<std::int64_t> complete_until_ns) override;
+  void usePacket(EventPacket packet) override;
+  void usePose(PoseSample pose) override;
+  FusionMapperOptions usedOptions() const override;
+  void describeInput(RecordingCounts& counts) const override;
+  bool hasEnded() const override { return ended_; }
+
+ private:
+  class FirstError;
+  std::vector<Input> confirmedBy(const EventPacket& packet);
+  std::vector<Input> confirmed(std::vector<PoseSample> poses);
+  void work(std::vector<Input> inputs, bool ends = false);
+  bool mapNext(FirstError& error);
+  Say sayer(FirstError& error);
+  template <typename Call>
+  void callBack(FirstError& error, const Call& call);
+
+  // Under cameras_mutex_.
+  std::vector<EventIntake> intakes_;  // one per camera
+  PoseIntake pose_intake_;
+  std::optional<TimeSpan> pose_times_;  // which confirm events
+
+  std::atomic<bool> stopped_ = false;
+  std::atomic<bool> ended_ = false;
+  // Guards the session and the members below. It is held while a keyframe is made.
+  mutable TurnMutex session_mutex_;
+  std::map<int, std::uint64_t> paused_events_;
+  std::set<std::thread::id> delivering_;  // threads that are in a callback
+  bool finished_ = false;
+};
+
+}  // namespace efm
