@@ -450,9 +450,10 @@ SessionStatus MappingSession::status() const {
   if (options_.live.enabled) {
     LiveStatus& live = status.live.emplace(live_);
     for (const auto& [camera, events] : status.rejected_events) live.cameras[camera].lost += events;
-    for (const int camera : selectedCameras(mapper_.rig(), options_.mapper.cameras)) {
-      live.cameras[camera].lost +=
-          status.counts.cameras[static_cast<std::size_t>(camera)].fates.losses();
+    for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
+      const auto camera = static_cast<int>(c);
+      if (!isSelected(camera, options_.mapper.cameras)) continue;
+      live.cameras[camera].lost += status.counts.cameras[c].fates.losses();
     }
   }
   status.pose_source = pose_source_.selected();

@@ -366,8 +366,8 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
                                  counts.votes.behind_camera, counts.keyframes,
                                  counts.keyframes_without_pose, counts.windows_without_events});
   numbers.insert(numbers.end(), dropped.begin(), dropped.end());
-  numbers.insert(numbers.end(), {counts.silent_subintervals, counts.sorted_events,
-                                 counts.duplicate_poses});
+  numbers.insert(numbers.end(),
+                 {counts.silent_subintervals, counts.sorted_events, counts.duplicate_poses});
   return numbers;
 }
 
