@@ -110,20 +110,26 @@ void addUnusedPoses(const SessionStatus& status, Warnings& warnings) {
 void addLosses(const SessionStatus& status, Warnings& warnings) {
   if (!status.live) return;
   const DroppedWindows& dropped = status.counts.dropped_windows;
-  if (status.live->dropRatio() > 0 || dropped.total() > 0) {
-    std::uint64_t subsampled = 0;
+  const std::uint64_t rejected_poses = status.live->rejected_poses;
+  if (status.live->dropRatio() > 0 || dropped.total() > 0 || rejected_poses > 0) {
+    std::uint64_t subsampled = 0, rejected = 0;
     bool overload = dropped[DropReason::kOverload] > 0;
     for (const auto& [index, camera] : status.live->cameras) {
       overload = overload || camera.fates[EventFate::kQueueFull] > 0;
       subsampled += camera.fates[EventFate::kSubsampled];
+      rejected += camera.fates[EventFate::kRejected];
     }
     std::string why;
+    if (rejected + rejected_poses > 0) {
+      why += fmt::format("; {} events and {} poses were late, or had wrong times or places",
+                         rejected, rejected_poses);
+    }
     if (subsampled > 0) {
       why += fmt::format("; {} events were more than [live] max_event_rate lets pass", subsampled);
     }
     if (overload) why += "; the machine is too slow for more ([live] max_queue_events)";
     if (!status.live->too_large.empty()) why += "; " + status.live->too_large;
-    addWarning(warnings, "events-lost", "{:.1f} % of the events were lost; {}{}",
+    addWarning(warnings, "events-lost", "{:.3g} % of the events were lost; {}{}",
                100 * status.live->dropRatio(), asText(dropped), why);
   }
   if (status.live->errors > 0) {

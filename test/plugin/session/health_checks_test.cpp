@@ -561,7 +561,13 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
          s.counts.dropped_windows[DropReason::kOverload] = 2;
          s.counts.dropped_windows[DropReason::kError] = 1;
        }),
-       "events-lost: 0.0 % of the events were lost; 3 windows dropped: "},
+       "events-lost: 0 % of the events were lost; 3 windows dropped: "},
+      {live([](auto& s) {
+         s.live->cameras[1].fates[EventFate::kRejected] = 1;
+         s.live->rejected_poses = 2;
+       }),
+       "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events and 2 poses were "
+       "late, or had wrong times or places"},
       {live([](auto& s) {
          s.live->errors = 2;
          s.live->last_error = "why";
