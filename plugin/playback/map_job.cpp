@@ -257,14 +257,9 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
   }
   if (takes) held->end();
   const RecordingSurvey survey = look.finish();
+  auto [mapper, choice, verdict] = choose(survey, options, true);
+  options.mapper = std::move(mapper);
   if (options.automatic.any()) {
-    OptionChoice choice = chooseOptions(options.automatic, survey.rig, survey.samples,
-                                        survey.duration_s, options.mapper);
-    const double passed =
-        options.live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
-    const double most = survey.most_events_per_s;
-    fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, options.mapper.policy,
-                 choice.options);
     first.chosen = std::move(choice.options);
     options.cloud.voxel_size_m = choice.voxel_size_m.value_or(options.cloud.voxel_size_m);
     options.automatic = {};
@@ -274,8 +269,6 @@ std::unique_ptr<Recording> MapSteps::firstLook() {
                              : "no scene was found to choose depth limits from");
     }
   }
-  PoseVerdict verdict = options.checks ? survey.judgePoses(options.mapper) : PoseVerdict();
-  verdict.applyTo(options.mapper);
   append(report.warnings, std::move(verdict.warnings));
   warnOfNew();
   verdict.notes = source.counts().notes;  // the quality says what could not be checked

@@ -21,15 +21,11 @@ void judge(FirstLook* look, RecordingInfo& info) {
   if (look != nullptr) {
     const RecordingSurvey survey = look->finish();
     if (!survey.samples.empty()) {
-      const EventFusionOptions defaults = defaultOptions();
-      FusionMapperOptions options = defaults.mapper;
-      info.chosen =
-          chooseOptions(defaults.automatic, survey.rig, survey.samples, survey.duration_s, options)
-              .options;
-      findings.use(options.keyframe.planes, info.chosen);
-      PoseVerdict verdict = survey.judgePoses(options);
-      info.warnings = std::move(verdict.warnings);
-      info.notes = std::move(verdict.notes);
+      Chosen chosen = choose(survey, defaultOptions(), true);
+      info.chosen = std::move(chosen.choice.options);
+      findings.use(chosen.mapper.keyframe.planes, info.chosen);
+      info.warnings = std::move(chosen.verdict.warnings);
+      info.notes = std::move(chosen.verdict.notes);
     }
   }
   append(info.warnings, warningsOf(findings));

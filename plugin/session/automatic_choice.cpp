@@ -50,15 +50,10 @@ bool MappingSession::chooseAutomatic() {
     // input, try the next piece. Otherwise wait for more data.
     if (!data && is_first && pieceEnds() && !hasWaitedTooLong() && endPiece()) continue;
     if (!data && !finished_ && !pieceEnds()) return false;
-    std::vector<WindowSample> samples;
-    std::optional<double> duration_s;  // set if all data are known
-    if (data) samples.push_back(sampleOf(*data));
-    if (data && finished_ && lengthOf(*data) < kFirstWindowS) duration_s = lengthOf(*data);
-    FusionMapperOptions chosen = options_.mapper;
-    OptionChoice choice =
-        chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, chosen);
-    if (data && is_first && !choice.found_scene && skipWithoutScene(*data)) continue;
-    useLook(data, std::move(choice), std::move(chosen));
+    const bool is_all = data && finished_ && lengthOf(*data) < kFirstWindowS;
+    Chosen chosen = chooseFrom(data, is_all ? std::optional(lengthOf(*data)) : std::nullopt);
+    if (data && is_first && !chosen.choice.found_scene && skipWithoutScene(*data)) continue;
+    useLook(data, std::move(chosen));
   }
   return true;
 }
@@ -68,17 +63,25 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
   std::optional<WindowData> data = mapper_.window();
   if (!data) data = mapper_.rest();
   if (!data || lengthOf(*data) < at_least_s) return false;
-  FusionMapperOptions chosen = options_.mapper;
-  OptionChoice choice =
-      chooseOptions(options_.automatic, mapper_.rig(), {sampleOf(*data)}, std::nullopt, chosen);
-  useLook(data, std::move(choice), std::move(chosen));
+  useLook(data, chooseFrom(data, std::nullopt));
   return true;
+}
+
+/// Chooses from live data. @param duration_s set if all data are known.
+Chosen MappingSession::chooseFrom(const std::optional<WindowData>& data,
+                                  std::optional<double> duration_s) const {
+  RecordingSurvey survey;
+  survey.rig = mapper_.rig();
+  if (data) survey.samples.push_back(sampleOf(*data));
+  survey.duration_s = duration_s;
+  return choose(survey, options_, false);
 }
 
 /// Uses a choice from live data. Without a scene, uses wide depth limits or the options of the
 /// first choice.
-void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice choice,
-                             FusionMapperOptions chosen) {
+void MappingSession::useLook(const std::optional<WindowData>& data, Chosen looked) {
+  OptionChoice& choice = looked.choice;
+  FusionMapperOptions& chosen = looked.mapper;
   if (!choice.found_scene && status_.choices > 0) {
     options_.automatic = {};
     return mapper_.configure(options_.mapper.policy, planes());
@@ -104,12 +107,10 @@ bool MappingSession::chooseFromFirstLook() {
       first_look_ends_ && status_.events &&
       secondsBetween(status_.events->first_ns, status_.events->last_ns) > kFirstWindowS;
   if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return false;
-  const RecordingSurvey survey = std::exchange(first_look_, nullptr)->finish();
-  FusionMapperOptions chosen = options_.mapper;
-  OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
-                                      finished_ ? survey.duration_s : std::nullopt, chosen);
-  PoseVerdict verdict = options_.checks ? survey.judgePoses(chosen) : PoseVerdict();
-  verdict.applyTo(chosen);
+  RecordingSurvey survey = std::exchange(first_look_, nullptr)->finish();
+  const double seen_s = survey.duration_s.value_or(0);
+  if (!finished_) survey.duration_s.reset();
+  auto [chosen, choice, verdict] = choose(survey, options_, true);
   mapper_.setMotion(chosen.keyframe.motion);
   status_.pose_warnings = std::move(verdict.warnings);
   status_.pose_notes = std::move(verdict.notes);
@@ -122,7 +123,7 @@ bool MappingSession::chooseFromFirstLook() {
   if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
   for (ChosenOption& option : choice.options) {
     option.reason += fmt::format(
-        "; from the first {:.3g} s of a stream{}", survey.duration_s.value_or(0),
+        "; from the first {:.3g} s of a stream{}", seen_s,
         first_look_ends_ ? ""
                          : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
   }

@@ -195,6 +195,22 @@ void PoseVerdict::applyTo(FusionMapperOptions& options) const {
   if (keep_motion && use == MotionCorrectionUse::kAuto) use = MotionCorrectionUse::kNever;
 }
 
+Chosen choose(const RecordingSurvey& survey, const EventFusionOptions& options, bool judges) {
+  Chosen chosen{options.mapper, {}, {}};
+  if (options.automatic.any()) {
+    chosen.choice = chooseOptions(options.automatic, survey.rig, survey.samples, survey.duration_s,
+                                  chosen.mapper);
+    const double passed =
+        options.live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
+    const double most = survey.most_events_per_s;
+    fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, chosen.mapper.policy,
+                 chosen.choice.options);
+  }
+  if (judges && options.checks) chosen.verdict = survey.judgePoses(chosen.mapper);
+  chosen.verdict.applyTo(chosen.mapper);
+  return chosen;
+}
+
 double eventRate(const WindowData& data) {
   std::size_t events = 0;
   for (const EventSpan& span : data.events) events += span.size();

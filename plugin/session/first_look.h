@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mapping/base/text.h"
+#include "mapping/survey/option_choice.h"
 #include "mapping/survey/scene_depths.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/session/event_fusion_options.h"
@@ -49,6 +50,18 @@ struct RecordingSurvey {
   /// @param options of the mapper, with the window of the map.
   PoseVerdict judgePoses(const FusionMapperOptions& options) const;
 };
+
+/// What is chosen for a recording, or for the beginning of a stream.
+struct Chosen {
+  FusionMapperOptions mapper;  ///< With the chosen values.
+  OptionChoice choice;
+  PoseVerdict verdict;  ///< About the poses, with these options.
+};
+
+/// Chooses the automatic options.
+/// @param judges whether the poses are judged, if the options have checks. Where they show that the
+/// calibration is wrong, the motion is not corrected.
+Chosen choose(const RecordingSurvey& survey, const EventFusionOptions& options, bool judges);
 
 /// First pass over a recording: takes some of its windows, evenly spread, without mapping them.
 /// Memory does not grow with the recording's length: above a million events per second and camera,

@@ -163,7 +163,7 @@ std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
   const std::lock_guard<std::mutex> lock(newest_mutex_);
   newest_depth_ = keyframe->map.depth;
   pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
-  newest_planes_ = session_.chosen().planes;
+  newest_planes_ = session_.newestPlanes();
   return keyframe;
 }
 
@@ -256,7 +256,7 @@ std::vector<std::string> MapperDriver::warningsOfSilence(const KeyframeDepthMap&
 
 MapperDriver::News MapperDriver::takeNews() {
   News news;
-  const std::uint64_t choices = session_.chosen().choices;
+  const std::uint64_t choices = session_.choices();
   const bool is_new_choice = std::exchange(told_choices_, choices) != choices;
   const bool is_first_blur = session_.correctedKeyframes() > 0 && !std::exchange(blur_told_, true);
   if (is_new_choice) news.choice = session_.status();

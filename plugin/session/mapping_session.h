@@ -99,13 +99,12 @@ class MappingSession {
   /// Return the poses of this session's keyframes, in order: in the cloud, and by the tracker.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
   const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }
-  /// Depth planes of the newest keyframe (or for the first one if there is none), and the number of
-  /// times that options were chosen.
-  struct Chosen {
-    DepthPlanesOptions planes;
-    std::uint64_t choices = 0;
-  };
-  Chosen chosen() const { return {newest_planes_.value_or(planes()), status_.choices}; }
+  /// Returns the depth planes of the newest keyframe, or for the first one if there is none.
+  const DepthPlanesOptions& newestPlanes() const {
+    return newest_planes_ ? *newest_planes_ : planes();
+  }
+  /// Returns the number of times that options were chosen.
+  std::uint64_t choices() const { return status_.choices; }
   SessionStatus status() const;
   /// Returns the time until which the events of the selected cameras are complete.
   std::int64_t eventsCompleteNs() const { return mapper_.eventsCompleteNs(); }
@@ -148,8 +147,8 @@ class MappingSession {
   bool chooseAutomatic();
   bool chooseFromFirstLook();
   bool chooseFromSoFar(double at_least_s);
-  void useLook(const std::optional<WindowData>& data, OptionChoice choice,
-               FusionMapperOptions chosen);
+  Chosen chooseFrom(const std::optional<WindowData>& data, std::optional<double> duration_s) const;
+  void useLook(const std::optional<WindowData>& data, Chosen looked);
   void use(OptionChoice choice, const FusionMapperOptions& chosen);
   std::optional<WindowData> dataToChooseFrom();
   bool hasWaitedTooLong();

@@ -304,7 +304,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
     const std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 50);
 
     ASSERT_FALSE(keyframes.empty()) << rest_s;
-    const DepthPlanesOptions& planes = session.chosen().planes;
+    const DepthPlanesOptions& planes = session.newestPlanes();
     const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // 1/m, in a window of 1 s
     const double step = std::max(
         pixel, (1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1));
