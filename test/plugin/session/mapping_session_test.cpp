@@ -201,6 +201,67 @@ TEST(MappingSession, TheFirstLookAtARecordingIsNoLiveOperation) {
   EXPECT_NEAR(survey.duration_s.value_or(0), 4.2, 0.02);
 }
 
+/// The table of README.md: which windows a break drops. They are 0.2 s long and begin each 0.1 s;
+/// the data come in steps of 10 ms.
+TEST(MappingSession, EachBreakDropsTheWindowsThatItCuts) {
+  const SyntheticRecording recording(2);
+  const auto at = [](double s) { return SyntheticRecording::kStartNs + durationFromSeconds(s); };
+  const struct {
+    const char* what;
+    Input input;    // after 1.05 s
+    double from_s;  // the data go on here, on the former clock
+    DropReason reason;
+    double begin_s;  // of the first window behind the break
+    std::uint64_t dropped;
+  } rows[] = {
+      // 0.9 and 1.0 s are not complete at 1.05 s. The next one begins behind the pose after.
+      {"a jump", Jump{{}, at(1.05), at(1.06)}, 1.06, DropReason::kJump, 1.1, 2},
+      {"a jump with a gap", Jump{{}, at(1.05), at(1.31)}, 1.31, DropReason::kJump, 1.4, 5},
+      {"missing events", Missing{0, at(1.15), DropReason::kOverload}, 1.15, DropReason::kOverload,
+       1.2, 3},
+      {"missing events until the next ones", Missing{0, at(9), DropReason::kOverload}, 1.06,
+       DropReason::kOverload, 1.1, 2},
+      {"paused", Missing{0, at(1.15), DropReason::kPaused}, 1.15, DropReason::kPaused, 1.2, 3},
+      // The windows of the new clock begin with its first event.
+      {"a clock reset", ClockReset{}, 1.06, DropReason::kClockReset, 1.06, 2},
+  };
+  for (const auto& row : rows) {
+    EventFusionOptions options = syntheticOptions();
+    options.live.enabled = true;
+    SessionOfRig session(options);
+    const bool resets = std::holds_alternative<ClockReset>(row.input);
+    const auto feed = [&](double from_s, double until_s) {
+      for (const StampedPose& pose : recording.poses) {
+        if (pose.t_ns >= at(from_s) && pose.t_ns < at(until_s)) session.add(sampleOf(pose));
+      }
+      for (int c = 0; c < 2; ++c) {
+        EventPacket packet = pieceOf(recording, c, from_s, until_s);
+        packet.complete_until_ns = at(until_s);
+        session.add(std::move(packet));
+      }
+      return mapDue(session);
+    };
+    EXPECT_EQ(feed(0, 1.055).size(), 9U) << row.what;
+    session.add(row.input);
+    EXPECT_THAT(mapDue(session), IsEmpty()) << row.what;
+    EXPECT_THAT(feed(row.from_s, row.from_s + 0.01), IsEmpty()) << row.what;
+    const std::vector<KeyframeDepthMap> behind = feed(row.from_s + 0.01, 2);
+    ASSERT_FALSE(behind.empty()) << row.what;
+    EXPECT_NEAR(secondsBetween(SyntheticRecording::kStartNs, behind[0].window.t0_ns), row.begin_s,
+                resets ? 0.01 : 0.003)
+        << row.what;
+    mapRest(session);
+    const SessionStatus status = session.status();
+    EXPECT_EQ(status.counts.dropped_windows[row.reason], row.dropped) << row.what;
+    EXPECT_EQ(status.counts.dropped_windows.total(), row.dropped) << row.what;
+    EXPECT_EQ(status.live->pose_jumps + status.live->clock_resets,
+              std::holds_alternative<Missing>(row.input) ? 0U : 1U)
+        << row.what;
+    EXPECT_EQ(status.held_events, 0U);
+    EXPECT_EQ(status.counts.total()[EventFate::kDropped] > 0, row.reason != DropReason::kPaused);
+  }
+}
+
 /// The machine is too slow to map before the clock goes back.
 TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
   const SyntheticRecording recording(1.3);
