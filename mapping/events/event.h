@@ -79,8 +79,8 @@ class CheckedEvents {
 /// sorted into place and counted.
 inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
 
-/// Beside a sensor, an event or pose farther than kFarAheadNs ahead of its stream is wrong if the
-/// next one goes back. What is last and farther than kMaxLastPauseNs ahead is wrong anywhere.
+/// Poses that are farther than kFarAheadNs ahead of their stream wait: see `EventChecker`, as for
+/// kMaxLastPauseNs.
 inline constexpr std::int64_t kFarAheadNs = 1'000'000'000;
 inline constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
 

@@ -8,13 +8,12 @@ namespace efm {
 namespace {
 
 constexpr std::size_t kMaxRuns = 512;
-constexpr std::size_t kMaxWaiting = 1'000'000;
 
 }  // namespace
 
-bool EventChecker::arePosesNear(const Run& run) const {
-  return poses_ns_ && run.min_ns >= poses_ns_->first - kNanosecondsPerSecond &&
-         run.max_ns <= poses_ns_->second + kNanosecondsPerSecond;
+bool EventChecker::areOthersNear(const Run& run) const {
+  return others_ns_ && run.min_ns >= others_ns_->first - kNanosecondsPerSecond &&
+         run.max_ns <= others_ns_->second + kNanosecondsPerSecond;
 }
 
 std::int64_t EventChecker::waitsSinceNs() const {
@@ -38,7 +37,7 @@ EventChecker::Verdict EventChecker::add(const Event& event, std::uint64_t number
   run.max_ns = std::max(run.max_ns, t_ns);
   if (run.max_ns - run.min_ns >= limits_.confirming_ns) {
     settle(Settle::kToConfirmed);
-  } else if (runs_.size() == kMaxRuns || waiting_.size() == kMaxWaiting) {
+  } else if (runs_.size() == kMaxRuns || waiting_.size() == limits_.max_waiting) {
     settle(Settle::kToMiddle);
   }
   return follows ? Verdict::kWaits : Verdict::kBeginsRun;
@@ -75,7 +74,7 @@ std::vector<std::size_t> EventChecker::longestChain(bool ends_with_last) const {
 bool EventChecker::rejectLoose(const std::vector<std::size_t>& chain, bool at_end) {
   const auto is_sure = [&](std::size_t first, std::size_t last) {  // runs of the chain, inclusive
     for (std::size_t i = first; i <= last; ++i) {
-      if (arePosesNear(runs_[chain[i]])) return true;
+      if (areOthersNear(runs_[chain[i]])) return true;
     }
     return runs_[chain[last]].max_ns - runs_[chain[first]].min_ns >= limits_.confirming_ns;
   };
@@ -104,7 +103,8 @@ void EventChecker::settle(Settle how) {
   do {
     chain = longestChain(how == Settle::kToConfirmed);
   } while (rejectLoose(chain, how == Settle::kAtEnd));
-  const std::size_t count = how == Settle::kToMiddle ? runs_.size() / 2 : runs_.size();
+  const std::size_t count =
+      how == Settle::kToMiddle ? std::max<std::size_t>(1, runs_.size() / 2) : runs_.size();
   for (Run& run : runs_) run.wrong = true;
   for (const std::size_t right : chain) runs_[right].wrong = false;
   settled_.clear();

@@ -34,6 +34,7 @@ class EventChecker {
     /// A stream must go on for this long behind a pause: longer than bursts of wrong times. A time
     /// word of a sensor (EVT 3) counts for 4.1 ms.
     std::int64_t confirming_ns = 20'000'000;
+    std::size_t max_waiting = 1'000'000;
   };
   /// An event whose waiting has ended.
   struct Settled {
@@ -47,9 +48,11 @@ class EventChecker {
   EventChecker() = default;
   explicit EventChecker(const Limits& limits) : limits_(limits) {}
 
-  /// Poses from `first_ns` to `last_ns`, on the camera's clock, confirm the first and the last
-  /// events.
-  void expectPoses(std::int64_t first_ns, std::int64_t last_ns) { poses_ns_ = {first_ns, last_ns}; }
+  /// Data of other sensors (poses, for events) from `first_ns` to `last_ns`, on this sensor's
+  /// clock, confirm the first and the last events.
+  void expectOthers(std::int64_t first_ns, std::int64_t last_ns) {
+    others_ns_ = {first_ns, last_ns};
+  }
 
   /// Adds an event if it follows the newest one at once, and nothing waits. @return whether it did.
   bool pass(const Event& event) {
@@ -92,13 +95,13 @@ class EventChecker {
   };
   enum class Settle { kToConfirmed, kToMiddle, kAtEnd, kAtDamage };
 
-  bool arePosesNear(const Run& run) const;
+  bool areOthersNear(const Run& run) const;
   std::vector<std::size_t> longestChain(bool ends_with_last) const;
   bool rejectLoose(const std::vector<std::size_t>& chain, bool at_end);
   void settle(Settle how);
 
   Limits limits_;
-  std::optional<std::pair<std::int64_t, std::int64_t>> poses_ns_;
+  std::optional<std::pair<std::int64_t, std::int64_t>> others_ns_;
   std::int64_t newest_ns_ = -kEndOfTimeNs;
   std::vector<Event> waiting_;
   std::vector<Run> runs_;
@@ -119,7 +122,7 @@ class EventIntake {
   /// Poses confirm the first and the last events.
   void expectPoses(std::int64_t first_ns, std::int64_t last_ns) {
     const std::int64_t offset_ns = calibration_.time_offset_ns;
-    checker_.expectPoses(first_ns - offset_ns, last_ns - offset_ns);
+    checker_.expectOthers(first_ns - offset_ns, last_ns - offset_ns);
   }
   /// Ends the waiting.
   CheckedEvents finish();

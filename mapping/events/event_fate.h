@@ -39,7 +39,7 @@ enum class EventFate {
   // Fates in the queue of live operation, before the mapping.
   kSubsampled,  ///< Subsampled: over the limit of events per second of sensor time.
   kQueueFull,   ///< Dropped because the queue was full.
-  kRejected,    ///< In a packet that contradicts its camera, or over 1 s ahead of its stream.
+  kRejected,    ///< Late, with a wrong time (`EventChecker`), or in a packet that is not possible.
   kPaused,      ///< Arrived while map updating was disabled.
   kAfterEnd,    ///< Arrived after the end of the input.
 };

@@ -19,6 +19,10 @@ Vector6d differenceOf(const Rigid3& T_a_b) {
   return difference;
 }
 
+double distanceBetween(const Rigid3& a, const Rigid3& b) {
+  return (a.translation - b.translation).norm() + a.rotation.angularDistance(b.rotation);
+}
+
 Rigid3 rigidFromDifference(const Vector6d& difference) {
   return {rotationBy(difference.tail<3>()), difference.head<3>()};
 }

@@ -62,6 +62,9 @@ inline Eigen::Quaterniond rotationBy(const Eigen::Vector3d& rotation_vector) {
 /// (axis times angle, at most pi) in radians. Covariances and informations have the same order.
 Vector6d differenceOf(const Rigid3& T_a_b);
 
+/// Returns the distance of two poses, metres and radians together: the motion of a point at 1 m.
+double distanceBetween(const Rigid3& a, const Rigid3& b);
+
 /// Inverts `differenceOf`.
 Rigid3 rigidFromDifference(const Vector6d& difference);
 

@@ -14,9 +14,8 @@ double metresBetween(const StampedPose& a, const StampedPose& b) {
 double angleBetween(const StampedPose& a, const StampedPose& b) {
   return a.T_world_rig.rotation.angularDistance(b.T_world_rig.rotation);
 }
-/// Metres and radians together: the motion of a point at 1 m.
 double distanceBetween(const StampedPose& a, const StampedPose& b) {
-  return metresBetween(a, b) + angleBetween(a, b);
+  return distanceBetween(a.T_world_rig, b.T_world_rig);
 }
 
 /// Counts a conflict; keeps the numbers of its first two poses.
@@ -85,7 +84,7 @@ void TrajectoryCheck::compareWithSameTime(const StampedPose& pose) {
 void TrajectoryCheck::lookForChange(const StampedPose& pose) {
   constexpr double kMinDistance = 0.02;
   constexpr std::int64_t kSamePlaceNs = 500'000'000;  // between two poses of one place
-  constexpr std::size_t kMaxBodies = 8;             // with one pose each between two poses
+  constexpr std::size_t kMaxBodies = 8;               // with one pose each between two poses
   const StampedPose& before = last_.back();
   const double distance = distanceBetween(before, pose);
   if (distance < kMinDistance || last_.size() < 2) return;

@@ -20,6 +20,8 @@ constexpr int kTracker = -1;
 constexpr std::int64_t kMaxAwayNs = 500'000'000;
 /// Poses that are far away at the end are wrong if they are too few for a window.
 constexpr std::int64_t kMinLastNs = 100'000'000;
+/// As many inputs wait at most until it is clear what they are: the clock may stand still.
+constexpr std::size_t kMaxHeld = 10'000;
 /// Poses behind a jump wait this long for events.
 constexpr std::int64_t kMaxJumpWaitNs = 600 * kNanosecondsPerSecond;
 
@@ -29,10 +31,6 @@ std::int64_t intervalOf(std::int64_t t_ns) {
 
 std::uint64_t bytesOf(const EventPacket& packet) {
   return sizeof(EventPacket) + packet.events.all().capacity() * sizeof(Event);
-}
-
-void append(std::vector<Event> more, std::vector<Event>& events) {
-  events.insert(events.end(), more.begin(), more.end());
 }
 
 }  // namespace
@@ -90,7 +88,7 @@ void Gate::add(const Rig& rig) {
 
 void Gate::add(EventPacket packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  take(packet.camera, std::move(packet.events).take(), packet.complete_until_ns);
+  receive(packet.camera, std::move(packet.events).take(), packet.complete_until_ns);
 }
 
 void Gate::add(int camera, std::vector<Event> events,
@@ -104,7 +102,7 @@ void Gate::add(int camera, std::vector<Event> events,
     counts.fates[ended_ ? EventFate::kAfterEnd : EventFate::kRejected] += events.size();
     throw;
   }
-  take(camera, std::move(events), complete_until_ns);
+  receive(camera, std::move(events), complete_until_ns);
 }
 
 void Gate::skip(int camera, const std::vector<Event>& events) {
@@ -165,8 +163,8 @@ std::int64_t Gate::offsetOf(int camera) const {
   return index < rig_.cameras.size() ? rig_.cameras[index].time_offset_ns : 0;
 }
 
-void Gate::take(int index, std::vector<Event> events,
-                std::optional<std::int64_t> complete_until_ns) {
+void Gate::receive(int index, std::vector<Event> events,
+                   std::optional<std::int64_t> complete_until_ns) {
   Camera& camera = cameraOf(index);
   camera.counts.received += events.size();
   if (ended_) {
@@ -211,7 +209,8 @@ void Gate::passRest(int index, Camera& camera, bool at_end) {
   takeSettled(camera, rest);
   std::optional<std::int64_t> none;
   rest = camera.budget.pass(std::move(rest), none);
-  append(camera.budget.finish(), rest);
+  const std::vector<Event> held = camera.budget.finish();
+  rest.insert(rest.end(), held.begin(), held.end());
   if (!rest.empty()) push({index, CheckedEvents(std::move(rest)), camera.passed_until_ns});
 }
 
@@ -317,7 +316,10 @@ void Gate::addTimely(PoseSample pose) {
   if (joined == 0) tracker.away.emplace_back();
   tracker.away.back().push_back(std::move(pose));
   const auto wait_ns = std::min(kMaxAwayNs, durationFromSeconds(options_.max_pose_wait_s) / 2);
-  if (t_ns - tracker.away.front().front().t_ns >= wait_ns) jump(tracker);
+  if (t_ns - tracker.away.front().front().t_ns >= wait_ns ||
+      tracker.away.back().size() == kMaxHeld) {
+    jump(tracker);
+  }
 }
 
 bool Gate::isJump(const PoseSample& from, const PoseSample& to) const {
@@ -346,7 +348,7 @@ bool Gate::isBack(const Tracker& tracker, const PoseSample& pose) const {
     T_world_expected = T_world_newest * rigidFromDifference(steps * differenceOf(T_before_newest));
   }
   const auto distance_to = [T = pose.T_world_rig()](const Rigid3& other) {
-    return (other.translation - T.translation).norm() + other.rotation.angularDistance(T.rotation);
+    return distanceBetween(other, T);
   };
   const double from_there = std::min(distance_to(T_world_newest), distance_to(T_world_expected));
   return from_there < distance_to(tracker.away.back().back().T_world_rig()) / 2;
@@ -381,7 +383,8 @@ void Gate::addOlder(int sensor, std::int64_t t_ns, Input input) {
     held_events_ += packet->events.size();
   }
   held_.emplace_back(sensor, std::move(input));
-  if (alone || held_events_ > static_cast<std::uint64_t>(options_.max_queue_events)) {
+  if (alone || held_.size() == kMaxHeld ||
+      held_events_ > static_cast<std::uint64_t>(options_.max_queue_events)) {
     rejectHeld(sensor);
   }
   if (went_back) resetClock();
@@ -397,7 +400,7 @@ void Gate::resetClock() {
       camera.older -= packet->events.size();
       held_events_ -= packet->events.size();
       camera.counts.received -= packet->events.size();  // received again
-      take(of, std::move(packet->events).take(), packet->complete_until_ns);
+      receive(of, std::move(packet->events).take(), packet->complete_until_ns);
     } else {
       addTimely(pose_intake_.add(std::get<PoseSample>(std::move(one))));
     }

@@ -93,8 +93,7 @@ class Gate {
   std::map<int, QueueCounts> counts() const;
   /// Returns the number of events over 10 ms older than their camera's newest one.
   std::uint64_t lateEvents() const;
-  /// Returns the number of poses that came after the end, or have a wrong
-  /// time or place.
+  /// Returns the number of poses that came after the end, or have a wrong time or place.
   std::uint64_t rejectedPoses() const;
 
  private:
@@ -127,7 +126,7 @@ class Gate {
 
   Camera& cameraOf(int index);
   std::int64_t offsetOf(int camera) const;
-  void take(int index, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
+  void receive(int index, std::vector<Event> events, std::optional<std::int64_t> complete_until_ns);
   void pass(int index, std::vector<Event> right);
   void passRest(int index, Camera& camera, bool at_end);
   void takeSettled(Camera& camera, std::vector<Event>& right);

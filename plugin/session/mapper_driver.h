@@ -93,7 +93,6 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   std::optional<KeyframeDepthMap> mapWindow();
   /// Makes a snapshot. Moves cloud and keyframes to their refined poses before, so that they agree.
   std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
-  virtual void keep(StoredKeyframe keyframe);
   /// Returns at most one warning per camera. The status counts the keyframes without its events.
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
 
@@ -124,6 +123,7 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
 
  private:
   void fixRig(const Rig& given);
+  void keep(StoredKeyframe keyframe);
 
   std::set<int> silent_cameras_;  // cameras without events that were logged
   std::uint64_t told_choices_ = 0;

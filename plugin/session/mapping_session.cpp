@@ -116,7 +116,7 @@ void MappingSession::feed(EventPacket packet) {
   dropOverdue(*newest_begin_ns_);
   if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs ||
       (options_.live.enabled &&
-       static_cast<double>(heldEvents()) > options_.live.queueEvents() / 2)) {
+       static_cast<double>(mapper_.heldEvents()) > options_.live.queueEvents() / 2)) {
     useSelected();
   }
 }
@@ -276,7 +276,7 @@ void MappingSession::limitWaits() {
 }
 
 void MappingSession::limitHeld(double max_events) {
-  const auto is_excess = [&] { return static_cast<double>(heldEvents()) > max_events; };
+  const auto is_excess = [&] { return static_cast<double>(mapper_.heldEvents()) > max_events; };
   constexpr double kEnoughS = 0.001;
   if (is_excess() && chooseFromSoFar(kEnoughS)) return;
   while (is_excess() && dropOldestWindow()) {
@@ -444,7 +444,7 @@ void MappingSession::applyPending() {
 
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
-  status.held_events = heldEvents();
+  status.held_events = mapper_.heldEvents();
   status.counts = earlier_counts_;
   status.counts += mapper_.counts();
   if (options_.live.enabled) {

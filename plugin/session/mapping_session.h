@@ -121,7 +121,6 @@ class MappingSession {
   const DepthPlanesOptions& planes() const {
     return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
   }
-  std::size_t heldEvents() const { return mapper_.heldEvents(); }
   bool hasCameras() const { return !mapper_.rig().cameras.empty(); }
   void addCameras(const Rig& rig);
   void addEvents(EventPacket packet);

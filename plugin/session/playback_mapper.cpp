@@ -71,6 +71,7 @@ void PlaybackMapper::usePacket(EventPacket packet) {
 }
 
 void PlaybackMapper::usePose(PoseSample pose) {
+  if (!PoseIntake::isPossible(pose)) return work({std::move(pose)});  // the session rejects it
   std::vector<Input> inputs;
   {
     const std::lock_guard<std::mutex> lock(cameras_mutex_);

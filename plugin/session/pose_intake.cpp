@@ -16,8 +16,8 @@ bool PoseIntake::isPossible(const PoseSample& pose) {
 std::vector<PoseSample> PoseIntake::add(PoseSample pose) {
   std::vector<PoseSample> right;
   Stream& stream = streams_[pose.source];
-  const Event time{pose.t_ns, 0, 0, false};
-  if (!isPossible(pose) || stream.checker.pass(time)) {
+  const Event time{pose.t_ns, 0, 0, false};  // the checker looks at nothing else
+  if (stream.checker.pass(time)) {
     right.push_back(std::move(pose));
   } else if (stream.checker.add(time, 0) == EventChecker::Verdict::kLate) {
     stream.checker.follow(pose.t_ns);  // the tracker's clock may have gone back
@@ -51,7 +51,7 @@ std::vector<PoseSample> PoseIntake::finish() {
   std::vector<PoseSample> right;
   for (auto& [source, stream] : streams_) {
     if (first_event_ns_ <= newest_event_ns_) {
-      stream.checker.expectPoses(first_event_ns_, newest_event_ns_);
+      stream.checker.expectOthers(first_event_ns_, newest_event_ns_);
     }
     stream.checker.finish(true);
     takeSettled(stream, right);

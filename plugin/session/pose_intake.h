@@ -25,6 +25,7 @@ class PoseIntake {
   PoseIntake() = default;
   /// Returns whether the session can use a pose of any time: it is finite, its time is in range.
   static bool isPossible(const PoseSample& pose);
+  /// @param pose is possible.
   /// @return the poses that are right, of this call and of earlier ones.
   std::vector<PoseSample> add(PoseSample pose);
   /// Tells the time of a camera's newest event, on the clock of the poses.
@@ -45,7 +46,7 @@ class PoseIntake {
       : wrong_poses_(wrong_poses), first_wrong_(std::move(first_wrong)) {}
 
   struct Stream {
-    EventChecker checker = EventChecker({kFarAheadNs, kFarAheadNs});
+    EventChecker checker = EventChecker({kFarAheadNs, kFarAheadNs, 10'000});
     std::deque<PoseSample> waiting;
   };
   void confirm(Stream& stream, std::vector<PoseSample>& right);

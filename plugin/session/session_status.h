@@ -109,7 +109,7 @@ inline void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
 /// taken + the sum of the fates.
 struct QueueCounts {
   std::uint64_t received = 0;
-  std::uint64_t held = 0;  ///< Waiting for the end of their 10 ms, or for a confirming event.
+  std::uint64_t held = 0;  ///< Waiting for the end of their 10 ms, or until their time is certain.
   std::uint64_t queued = 0;
   std::uint64_t taken = 0;  ///< Taken by the mapping: `EventCounts::read`, or `rejected_events`.
   /// Part of `taken`: rejected, or lost by fate. Not counted for a camera that takes no part.
@@ -128,8 +128,8 @@ struct LiveStatus {
   std::uint64_t late_events = 0;   ///< Rejected: over 10 ms older than their camera's newest one.
   std::uint64_t pose_jumps = 0;    ///< Tracker jumps; each begins a new segment of poses.
   std::uint64_t clock_resets = 0;  ///< Clock resets; each starts the mapping again.
-  /// Rejected poses: over a second older than the newest one; ahead of the poses before and after;
-  /// not valid; or after the end.
+  /// Rejected poses: over a second older than the newest one; with a time or place far from the
+  /// poses before and after; not valid; or after the end.
   std::uint64_t rejected_poses = 0;
   std::uint64_t errors = 0;  ///< Errors of the mapping and callbacks; see `RefinementState`, too.
   std::string last_error;    ///< Last error, also of rejected samples; empty: none.

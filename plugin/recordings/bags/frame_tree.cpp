@@ -182,9 +182,8 @@ FrameChain FrameTree::along(const Way& way, std::vector<Warning>& warnings) cons
   };
   if (!moving.empty()) read_(take);
   for (auto& [pair, poses] : moving) {
-    auto warning = takeOneTrajectory(
-        poses, fmt::format("the transform {}->{}", pair.first, pair.second), true);
-    if (warning) warnings.push_back(std::move(*warning));
+    takeOneTrajectory(poses, fmt::format("the transform {}->{}", pair.first, pair.second), warnings,
+                      true);
   }
   FrameChain chain;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -256,10 +256,7 @@ void addGivenPoses(const RecordingSource& source, bool has_hand_eye, RecordingPa
 /// @throws std::runtime_error for poses of a source that are not one trajectory.
 void takeOneTrajectoryEach(RecordingParts& parts, const RecordingSource& source) {
   const std::string name = sourceNames(source.files);
-  const auto take = [&](std::vector<StampedPose>& poses, const std::string& of) {
-    if (auto warning = takeOneTrajectory(poses, of)) parts.warnings.push_back(std::move(*warning));
-  };
-  take(parts.poses, name);
+  takeOneTrajectory(parts.poses, name, parts.warnings);
   std::map<PoseSourceId, std::pair<std::vector<StampedPose>, std::vector<std::size_t>>> by_source;
   for (std::size_t i = 0; i < parts.pose_samples.size(); ++i) {
     const PoseSample& pose = parts.pose_samples[i];
@@ -270,8 +267,9 @@ void takeOneTrajectoryEach(RecordingParts& parts, const RecordingSource& source)
   std::vector<std::size_t> wrong;
   for (auto& [id, of_source] : by_source) {
     auto& [poses, indices] = of_source;
-    for (const std::size_t i : findWrongTimes(poses)) wrong.push_back(indices[i]);
-    take(poses, name + ": " + asText(id));
+    for (const std::size_t i : takeOneTrajectory(poses, name + ": " + asText(id), parts.warnings)) {
+      wrong.push_back(indices[i]);
+    }
   }
   std::sort(wrong.begin(), wrong.end());
   removeAt(wrong, parts.pose_samples);

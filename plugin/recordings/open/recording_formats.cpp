@@ -247,9 +247,7 @@ RecordingParts posesOfRecording(const fs::path& file, ReaderOptions options) {
   options.topics_of_other_files = true;  // the topics are for the events, too
   RecordingParts parts = format->open({file}, options);
   if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
-  if (auto warning = takeOneTrajectory(parts.poses, file.string())) {
-    parts.warnings.push_back(std::move(*warning));
-  }
+  takeOneTrajectory(parts.poses, file.string(), parts.warnings);
   if (!parts.poses.empty()) return parts;
   throw std::runtime_error(
       fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));

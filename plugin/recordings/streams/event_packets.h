@@ -38,7 +38,7 @@ class EventPackets {
   void skipBadEvents(BadEvents& bad);
   /// Poses of these times, on the camera's clock, confirm the first and the last events.
   void expectPoses(std::int64_t first_ns, std::int64_t last_ns) {
-    checker_.expectPoses(first_ns, last_ns);
+    checker_.expectOthers(first_ns, last_ns);
   }
   /// Leaves out the events before a time, without reading them if the format allows it. Call it
   /// before `nextPacket` and `nextTime`.

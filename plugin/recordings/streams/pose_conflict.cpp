@@ -17,11 +17,6 @@
 namespace efm {
 namespace {
 
-/// Metres and radians together: the motion of a point at 1 m.
-double distanceBetween(const Rigid3& a, const Rigid3& b) {
-  return (a.translation - b.translation).norm() + a.rotation.angularDistance(b.rotation);
-}
-
 /// Finds a conflict of the poses of an interval. @param order indices in the order of time.
 std::optional<PoseConflict> conflictIn(const std::vector<StampedPose>& poses,
                                        const std::vector<std::size_t>& order, std::int64_t from_ns,
@@ -165,18 +160,18 @@ Warning skippedPoses(std::uint64_t count, const std::string& first) {
           fmt::format("{} poses with wrong times were left out, the first one: {}", count, first)};
 }
 
-std::optional<Warning> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
-                                         bool takes_lost) {
+std::vector<std::size_t> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
+                                           std::vector<Warning>& warnings, bool takes_lost) {
   const auto place_of = [&](std::size_t i) { return formatSeconds(poses[i].t_ns) + " s"; };
-  std::optional<Warning> warning;
-  if (const std::vector<std::size_t> wrong = findWrongTimes(poses); !wrong.empty()) {
-    warning = skippedPoses(wrong.size(), name + ": " + place_of(wrong.front()));
+  std::vector<std::size_t> wrong = findWrongTimes(poses);
+  if (!wrong.empty()) {
+    warnings.push_back(skippedPoses(wrong.size(), name + ": " + place_of(wrong.front())));
     removeAt(wrong, poses);
   }
   if (const std::optional<PoseConflict> conflict = findPoseConflict(poses, takes_lost)) {
     throw std::runtime_error(fmt::format("{}: {}", name, conflict->text(place_of)));
   }
-  return warning;
+  return wrong;
 }
 
 }  // namespace efm

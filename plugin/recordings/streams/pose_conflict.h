@@ -58,10 +58,10 @@ void removeAt(const std::vector<std::size_t>& indices, std::vector<Item>& items)
 /// Returns the warning about poses that were left out. @param first what is wrong with the first.
 Warning skippedPoses(std::uint64_t count, const std::string& first);
 
-/// Leaves out the poses with wrong times. @return the warning, if there are any.
+/// Leaves out the poses with wrong times, and warns of them. @return their indices.
 /// @throws std::runtime_error with a conflict of the poses, whose places are their times.
 /// @param name name of the poses, for the error.
-std::optional<Warning> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
-                                         bool takes_lost = false);
+std::vector<std::size_t> takeOneTrajectory(std::vector<StampedPose>& poses, const std::string& name,
+                                           std::vector<Warning>& warnings, bool takes_lost = false);
 
 }  // namespace efm

@@ -335,6 +335,24 @@ TEST(Gate, LeavesOutWhatIsWrongAloneAndFindsTheBreaks) {
   }
 }
 
+/// A sensor whose clock stands still must not fill the memory.
+TEST(Gate, WhatWaitsIsBoundedIfAClockStandsStill) {
+  for (const int stands_at_ms : {-100'000, 100'000, 3001}) {  // behind, ahead, away
+    Sensor sensor;
+    sensor.send(
+        3000, [](int, auto&) {}, [](int, auto&) {});
+    const int healthy = sensor.poses;
+    for (int i = 0; i < 30'000; ++i) {
+      PoseSample pose{{}, Sensor::kMs * stands_at_ms, {}, {}};
+      pose.T_world_body.translation.x() = 60;
+      sensor.gate.add(pose);
+    }
+    sensor.newest_ns = kMaxTimeNs;  // the events go on
+    sensor.take();
+    EXPECT_GE(sensor.poses - healthy + int(sensor.gate.rejectedPoses()), 20'000) << stands_at_ms;
+  }
+}
+
 /// The limits are 10 m/s and 100 degrees/s plus five standard deviations of the stated noise.
 TEST(Gate, AJumpIsAMotionThatNothingExplains) {
   const struct {
