@@ -190,15 +190,13 @@ class Mapper {
   SessionStatus status() const;
   /// Returns the warnings so far: poses and cameras that do not explain the events, implausible
   /// own data, unused data, and after `finish` why there is no keyframe, and coordinates that are
-  /// too far for floats (`far-coordinates`: it exports the map). Own events are judged in
-  /// playback, poses against events if options are automatic; `mapRecording` judges always.
+  /// too far for floats (`far-coordinates`: it exports the map). Some checks run only sometimes:
+  /// own events only in playback, poses against events only with automatic options.
+  /// `mapRecording` runs all.
   std::vector<Warning> warnings() const;
 
-  /// For hosts in this project: mapper_driver.h is not installed.
-  MapperDriver& driver() const { return *driver_; }
-
- private:
-  std::shared_ptr<MapperDriver> driver_;
+ protected:
+  std::shared_ptr<MapperDriver> driver_;  ///< Not for hosts: its class is not installed.
 };
 
 /// What `mapRecording` made.

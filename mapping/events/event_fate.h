@@ -32,7 +32,9 @@ enum class EventFate {
   kUsed,           ///< The event voted in at least one keyframe.
   kWithoutPose,    ///< The trajectory has no pose at its time.
   kOutsideWindow,  ///< The event is in no window that was mapped.
-  kDropped,        ///< Too late, in a dropped window, or from an unselected camera.
+  kLate,           ///< The event came after its window was mapped.
+  kDropped,        ///< Every window of the event was dropped.
+  kUnselected,     ///< From a camera that is not selected.
   kFiltered,       ///< Removed as noise, with or without a pose.
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
   kOverBudget,     ///< In a mapped window, but not among the events chosen for it.
@@ -55,14 +57,16 @@ inline constexpr EventFateRow kEventFates[] = {
     {EventFate::kUsed, "used", "used", false},
     {EventFate::kWithoutPose, "without_pose", "without a pose"},
     {EventFate::kOutsideWindow, "outside_window", "outside the keyframes' windows", false},
-    {EventFate::kDropped, "dropped", "too late, or of a camera that takes no part"},
+    {EventFate::kLate, "late", "too late"},
+    {EventFate::kDropped, "dropped", "in dropped windows"},
+    {EventFate::kUnselected, "unselected", "of cameras that are not selected", false},
     {EventFate::kFiltered, "filtered", "filtered as noise", false},
     {EventFate::kOutsideLens, "outside_lens", "outside the lens model", false},
     {EventFate::kOverBudget, "over_budget", "over max_events_per_camera", false},
 
-    {EventFate::kSubsampled, "thinned", "subsampled"},
+    {EventFate::kSubsampled, "subsampled", "subsampled"},
     {EventFate::kQueueFull, "dropped", "dropped"},
-    {EventFate::kRejected, "refused", "rejected"},
+    {EventFate::kRejected, "rejected", "rejected"},
     {EventFate::kPaused, "paused", "paused", false},
     {EventFate::kAfterEnd, "after_end", "after the end"},
 };

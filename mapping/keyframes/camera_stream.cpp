@@ -72,8 +72,10 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
     std::optional<EventFate> fate;
     if (selected_ && !limits.contain(event.t_ns)) {
       fate = EventFate::kOutsideWindow;
-    } else if (!selected_ || event.t_ns < released_ns) {
-      fate = EventFate::kDropped;
+    } else if (!selected_) {
+      fate = EventFate::kUnselected;
+    } else if (event.t_ns < released_ns) {
+      fate = event.t_ns < dropped_until_ns_ ? EventFate::kDropped : EventFate::kLate;
     } else if (!outside_lens_.empty() && outside_lens_[event.y * width + event.x]) {
       fate = EventFate::kOutsideLens;
     }
@@ -133,6 +135,7 @@ void CameraStream::markUsed(const Window& window, const Trajectory& trajectory,
 
 void CameraStream::dropWindows(std::int64_t t0_ns, std::int64_t t1_ns) {
   if (t0_ns >= t1_ns) return;
+  dropped_until_ns_ = std::max(dropped_until_ns_, t1_ns);
   if (!dropped_.empty() && dropped_.back().t1_ns >= t0_ns) {
     dropped_.back().t1_ns = std::max(dropped_.back().t1_ns, t1_ns);
   } else {

@@ -79,8 +79,9 @@ class CameraStream {
   std::vector<bool> outside_lens_;
   std::optional<FilteredEvents> filter_;
   EventBuffer buffer_;
-  std::vector<Window> over_budget_;  // windows whose events were not all chosen
-  std::vector<Window> dropped_;      // times of windows that were dropped, in order
+  std::vector<Window> over_budget_;             // windows whose events were not all chosen
+  std::vector<Window> dropped_;                 // times of windows that were dropped, in order
+  std::int64_t dropped_until_ns_ = kMinTimeNs;  // end of the last one of all
   std::size_t pose_cursor_ = 0;
   std::optional<std::int64_t> newest_ns_;
   std::int64_t complete_ns_ = kMinTimeNs;

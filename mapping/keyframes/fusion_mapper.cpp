@@ -100,15 +100,15 @@ void FusionMapper::setAllCompleteUntil(std::int64_t t_ns) {
   if (!start_ns_) dropWindowsBefore(t_ns, DropReason::kNoPose);
 }
 
-std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
+std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageTimes* times) {
   failed_.reset();
   {
-    const StageScope scope(stages, Stage::kFilter);
+    const StageScope scope(times, &StageSeconds::filter);
     filterEvents();
   }
   while (const std::optional<Window> window = completeWindow()) {
     failed_ = window;
-    std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
+    std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, times);
     failed_.reset();
     policy_->advance(*window, keyframe ? &*keyframe : nullptr);
     releaseBefore(releasableUntil());
@@ -305,13 +305,13 @@ bool FusionMapper::isComplete(const Window& window) const {
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
-                                                        StageHook* stages) {
+                                                        StageTimes* times) {
   const std::vector<EventSpan> events = eventsOf(window);
   if (std::all_of(events.begin(), events.end(), [](EventSpan span) { return span.empty(); })) {
     ++counts_.windows_without_events;
     return std::nullopt;
   }
-  auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, stages);
+  auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, times);
   if (!keyframe) {
     ++counts_.keyframes_without_pose;
     return std::nullopt;

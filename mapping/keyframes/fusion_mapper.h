@@ -84,7 +84,7 @@ class FusionMapper : private RecordingProgress {
   void finish() { finished_ = true; }
 
   /// Maps the next complete window, if there is one. This call does the whole work of a keyframe.
-  std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr, StageHook* stages = nullptr);
+  std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr, StageTimes* times = nullptr);
 
   /// Returns the data of the window that `next` would map, without mapping it.
   /// @return std::nullopt if no window is complete; after `finish` the data of `rest` instead.
@@ -144,7 +144,7 @@ class FusionMapper : private RecordingProgress {
   std::vector<EventSpan> eventsOf(const Window& window) const;
   void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, DropReason reason);
   bool isComplete(const Window& window) const;
-  std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);
+  std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageTimes* times);
   KeyframeMapper& keyframeMapper() const;
   std::int64_t releasableUntil() const;
   void releaseBefore(std::int64_t t_ns);

@@ -13,6 +13,7 @@
 #include "mapping/base/option.h"
 #include "mapping/base/thread_arena.h"
 #include "mapping/events/event.h"
+#include "mapping/motion/slice_alignment.h"
 
 namespace efm {
 
@@ -74,52 +75,6 @@ double sharpnessOf(const KeyframeDepthMap& keyframe) {
 /// of its events has a right scale.
 constexpr double kCentral = 0.2;
 
-}  // namespace
-
-KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along,
-                              const AlignMotion& align) {
-  const MotionCorrectionOptions& options = window.options;
-  const WindowInput& input = window.input;
-  KeyframeDepthMap keyframe = map_along(input, window.tracked, nullptr);
-  const double sharpness = sharpnessOf(keyframe);
-  std::optional<double> blur_px;
-  cv::Mat1f depth = window.central_depth;
-  Trajectory motion = window.tracked;
-  for (int round = 0; round < options.motion_rounds; ++round) {
-    std::optional<AlignedMotion> aligned;
-    {
-      const StageScope scope(window.stages, Stage::kSweep);
-      aligned = align(depth, keyframe.motion_correction);
-      // In slow motion the central part may have too few points.
-      if (!aligned && round == 0) aligned = align(keyframe.map.depth, std::nullopt);
-    }
-    if (!aligned) break;
-    if (round == 0) blur_px = 0;
-    constexpr double kSameMotionPx = 0.25;  // of the finest edges; less does not blur the DSI
-    if (aligned->shift_px < kSameMotionPx * aligned->finest_px) break;
-    Trajectory corrected = correctedTrajectory(window.tracked, input.window, aligned->correction);
-    KeyframeDepthMap sharper = map_along(input, corrected, nullptr);
-    const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
-    if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(keyframe))) break;
-    if (round == 0) blur_px = aligned->shift_px;
-    motion = std::move(corrected);
-    keyframe = std::move(sharper);
-    keyframe.motion_correction = aligned->correction;
-    depth = keyframe.map.depth;
-  }
-  const double gain = sharpness > 0 ? sharpnessOf(keyframe) / sharpness : 1;
-  if (window.sink != nullptr) {
-    std::optional<MotionCorrection> correction = std::move(keyframe.motion_correction);
-    keyframe = map_along(input, motion, window.sink);
-    keyframe.motion_correction = std::move(correction);
-  }
-  keyframe.blur_px = blur_px;
-  keyframe.sharpness_gain = gain;
-  return keyframe;
-}
-
-namespace {
-
 void requireCamera(const Rig& rig, int camera, const char* key) {
   const auto count = static_cast<int>(rig.cameras.size());
   requireOption(camera >= 0 && camera < count, key, camera,
@@ -178,7 +133,7 @@ Rigid3 KeyframeMapper::referencePose(const Rigid3& T_world_rig) const {
 std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
                                                     const std::vector<EventSpan>& events,
                                                     const Trajectory& trajectory, DsiSink* sink,
-                                                    StageHook* stages) {
+                                                    StageTimes* times) {
   // 1. Input: events, trajectory, calibration.
   const std::vector<CameraEvents> all = selectedEvents(events);
   std::vector<CameraEvents> cameras = all;
@@ -196,7 +151,7 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   // 3-5. From events to depth.
   ThreadArena arena(options_.sweep.threadsOrCores());
   KeyframeDepthMap keyframe =
-      arena.execute([&] { return mapBest(input, trajectory, sink, stages); });
+      arena.execute([&] { return mapBest(input, trajectory, sink, times); });
 
   keyframe.T_rig_ref = referencePose({});
   keyframe.over_budget = over_budget;
@@ -227,61 +182,100 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
 /// Maps a window, with correction of the motion where the options or the blur of the events call
 /// for it.
 KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Trajectory& tracked,
-                                         DsiSink* sink, StageHook* stages) {
+                                         DsiSink* sink, StageTimes* times) {
   const MotionCorrectionUse use = options_.motion.correct_motion;
-  if (use == MotionCorrectionUse::kNever) return mapAlong(input, tracked, sink, stages);
+  if (use == MotionCorrectionUse::kNever) return mapAlong(input, tracked, sink, times);
   const bool watches = use == MotionCorrectionUse::kAuto;
   const auto corrects = [&] { return !watches || (input.cameras.size() > 1 && blur_.isOn()); };
-  const auto map_along = [&](const WindowInput& part, const Trajectory& motion, DsiSink* dsi) {
-    return mapAlong(part, motion, dsi, stages);
-  };
-  std::optional<double> looked_px;
-  double finest_px = 1;
   if (!corrects() && !blur_.isDue()) {
     blur_.add(std::nullopt);
-    return mapAlong(input, tracked, sink, stages);
+    return mapAlong(input, tracked, sink, times);
   }
-  const CentralPart central(input, kCentral);
-  const cv::Mat1f central_depth = map_along(central.input(input), tracked, nullptr).map.depth;
-  if (!corrects()) {
-    {
-      const StageScope scope(stages, Stage::kSweep);
+  std::optional<double> looked_px;
+  double finest_px = 1;
+  cv::Mat1f central_depth;
+  {
+    const StageScope scope(times, &StageSeconds::motion);
+    const CentralPart central(input, kCentral);
+    central_depth = mapAlong(central.input(input), tracked, nullptr, nullptr).map.depth;
+    if (!corrects()) {
       const SliceAlignment slices(input, tracked, options_.motion, SliceEffort::look());
       const std::optional<AlignedMotion> aligned = slices.align(central_depth, slices.none());
       if (aligned) looked_px = aligned->shift_px;
       if (aligned) finest_px = aligned->finest_px;
-    }
-    blur_.add(looked_px, finest_px);
-    if (!corrects()) {
-      KeyframeDepthMap keyframe = mapAlong(input, tracked, sink, stages);
-      keyframe.blur_px = looked_px;
-      return keyframe;
+      blur_.add(looked_px, finest_px);
     }
   }
-  std::optional<SliceAlignment> slices;  // finds the edges once for all rounds
-  const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
-    if (!slices) slices.emplace(input, tracked, options_.motion);
-    auto aligned = slices->align(depth, start.value_or(slices->none()));
-    if (aligned) finest_px = aligned->finest_px;
-    return aligned;
-  };
-  KeyframeDepthMap keyframe = mapCorrected(
-      {input, tracked, options_.motion, central_depth, sink, stages}, map_along, align);
+  if (!corrects()) {
+    KeyframeDepthMap keyframe = mapAlong(input, tracked, sink, times);
+    keyframe.blur_px = looked_px;
+    return keyframe;
+  }
+  KeyframeDepthMap keyframe = mapSharpest(input, tracked, central_depth, sink, times, finest_px);
   if (watches && !looked_px) blur_.add(keyframe.blur_px, finest_px);
   if (looked_px) blur_.setLast(keyframe.blur_px.value_or(0), finest_px);
   return keyframe;
 }
 
+/// Maps a window along the tracker's motion, then finds the correction of the motion from the depth
+/// and maps again along the corrected motion, while the fused DSI becomes sharper. The first
+/// correction is from the depth of the window's central part.
+/// @param central_depth of that part, along the tracker's motion.
+/// @param sink receives only the DSI of the result.
+/// @param finest_px in and out: see AlignedMotion.
+KeyframeDepthMap KeyframeMapper::mapSharpest(const WindowInput& input, const Trajectory& tracked,
+                                             const cv::Mat1f& central_depth, DsiSink* sink,
+                                             StageTimes* times, double& finest_px) const {
+  constexpr double kSameMotionPx = 0.25;  // of the finest edges; less does not blur the DSI
+  KeyframeDepthMap sharpest = mapAlong(input, tracked, nullptr, times);
+  const double sharpness = sharpnessOf(sharpest);
+  std::optional<double> blur_px;
+  Trajectory motion = tracked;
+  {
+    const StageScope scope(times, &StageSeconds::motion);
+    const SliceAlignment slices(input, tracked, options_.motion);
+    for (int round = 0; round < options_.motion.motion_rounds; ++round) {
+      const bool is_first = round == 0;
+      auto aligned = slices.align(is_first ? central_depth : sharpest.map.depth,
+                                  sharpest.motion_correction.value_or(slices.none()));
+      // In slow motion the central part may have too few points.
+      if (!aligned && is_first) aligned = slices.align(sharpest.map.depth, slices.none());
+      if (!aligned) break;
+      finest_px = aligned->finest_px;
+      if (is_first) blur_px = 0;
+      if (aligned->shift_px < kSameMotionPx * finest_px) break;
+      Trajectory corrected = correctedTrajectory(tracked, input.window, aligned->correction);
+      KeyframeDepthMap sharper = mapAlong(input, corrected, nullptr, nullptr);
+      const double min_gain = is_first ? options_.motion.min_gain : 0;
+      if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(sharpest))) break;
+      if (is_first) blur_px = aligned->shift_px;
+      motion = std::move(corrected);
+      sharpest = std::move(sharper);
+      sharpest.motion_correction = std::move(aligned->correction);
+    }
+  }
+  const double gain = sharpness > 0 ? sharpnessOf(sharpest) / sharpness : 1;
+  if (sink != nullptr) {
+    std::optional<MotionCorrection> correction = std::move(sharpest.motion_correction);
+    sharpest = mapAlong(input, motion, sink, times);
+    sharpest.motion_correction = std::move(correction);
+  }
+  sharpest.blur_px = blur_px;
+  sharpest.sharpness_gain = gain;
+  return sharpest;
+}
+
 KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajectory& motion,
-                                          DsiSink* sink, StageHook* stages) const {
+                                          DsiSink* sink, StageTimes* times) const {
   KeyframeDepthMap keyframe;
   keyframe.window = input.window;
   keyframe.T_world_ref = input.T_world_ref;
   keyframe.view = view_;
+  keyframe.planes = options_.planes;
   keyframe.events.resize(rig_.cameras.size());
   std::vector<WindowRays> cameras(input.cameras.size());
   {
-    const StageScope scope(stages, Stage::kSweep);
+    const StageScope scope(times, &StageSeconds::rays);
     // 3. Divides the window into sub-intervals and back-projects their events, cameras in parallel.
     tbb::parallel_for(std::size_t{0}, cameras.size(), [&](std::size_t i) {
       cameras[i] = raysOf(input.cameras[i], input, motion, groups_, options_.packets);
@@ -295,10 +289,10 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   if (seen) keyframe.parallax_px_m = seen->parallax_px_m;
   SweepResult swept;
   {
-    const StageScope scope(stages, Stage::kSweep);  // apart from the rays, for benchmarks
-    swept = fuse(cameras, input.planes, sink);      // 4.
+    const StageScope scope(times, &StageSeconds::sweep);
+    swept = fuse(cameras, input.planes, sink);  // 4.
   }
-  const StageScope scope(stages, Stage::kDepth);
+  const StageScope scope(times, &StageSeconds::depth);
   extract(swept, cameras, input.planes, keyframe);  // 5.
   return keyframe;
 }

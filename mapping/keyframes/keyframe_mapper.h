@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <vector>
 
+#include "mapping/base/stage_times.h"
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/depth/peak_fit.h"
 #include "mapping/events/window.h"
@@ -13,44 +13,10 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/motion/motion_correction.h"
-#include "mapping/motion/slice_alignment.h"
 #include "mapping/rays/rays.h"
 #include "mapping/sweep/space_sweep.h"
 
 namespace efm {
-
-/// The stages of the mapping, for time measurements. The mapping itself never reads a clock.
-enum class Stage {
-  kFilter,  ///< Removal of noise from new events.
-  kSweep,   ///< Packets, back-projection, votes and fusion.
-  kDepth,   ///< Extraction of the depth map.
-};
-
-/// Callbacks at the beginning and the end of a stage, in the thread that runs the mapper.
-class StageHook {
- public:
-  virtual ~StageHook() = default;
-  virtual void begin(Stage stage) = 0;
-  virtual void end(Stage stage) = 0;
-};
-
-/// Reports a stage for the lifetime of this object.
-class StageScope {
- public:
-  /// @param hook may be null.
-  StageScope(StageHook* hook, Stage stage) : hook_(hook), stage_(stage) {
-    if (hook_ != nullptr) hook_->begin(stage_);
-  }
-  ~StageScope() {
-    if (hook_ != nullptr) hook_->end(stage_);
-  }
-  StageScope(const StageScope&) = delete;
-  StageScope& operator=(const StageScope&) = delete;
-
- private:
-  StageHook* hook_;
-  Stage stage_;
-};
 
 /// The rays of one camera's events of a window, and counts of its events.
 struct WindowRays {
@@ -68,31 +34,6 @@ struct WindowRays {
 WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
                   const Trajectory& trajectory, const EventGroups& groups,
                   const PosePacketsOptions& packets);
-
-/// A window that is mapped with correction of its motion. Owns nothing.
-struct CorrectedWindow {
-  const WindowInput& input;
-  const Trajectory& tracked;
-  const MotionCorrectionOptions& options;
-  const cv::Mat1f& central_depth;  ///< Along the tracker's motion, of the central part.
-  DsiSink* sink = nullptr;         ///< May be null; receives only the DSI of the result.
-  StageHook* stages = nullptr;     ///< May be null.
-};
-
-/// Maps a window or a part of it along a motion; the sink may be null.
-using MapAlong =
-    std::function<KeyframeDepthMap(const WindowInput&, const Trajectory& motion, DsiSink* sink)>;
-
-/// Finds the motion from a depth: see SliceAlignment::align. Without a start, it is the tracker's.
-using AlignMotion = std::function<std::optional<AlignedMotion>(
-    const cv::Mat1f& depth, const std::optional<MotionCorrection>& start)>;
-
-/// Maps the window along the tracker's motion, then finds the correction of the motion from the
-/// depth and maps again along the corrected motion, while the fused DSI becomes sharper. The first
-/// correction is from the depth of the window's central part.
-/// @return the sharpest keyframe, with its correction if there is one.
-KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along,
-                              const AlignMotion& align);
 
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;
@@ -133,7 +74,7 @@ class KeyframeMapper {
   /// @return std::nullopt if the reference time has no pose.
   std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
-                                      StageHook* stages = nullptr);
+                                      StageTimes* times = nullptr);
 
   /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);
@@ -152,9 +93,12 @@ class KeyframeMapper {
   }
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
   KeyframeDepthMap mapBest(const WindowInput& input, const Trajectory& tracked, DsiSink* sink,
-                           StageHook* stages);
+                           StageTimes* times);
+  KeyframeDepthMap mapSharpest(const WindowInput& input, const Trajectory& tracked,
+                               const cv::Mat1f& central_depth, DsiSink* sink, StageTimes* times,
+                               double& finest_px) const;
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
-                            StageHook* stages) const;
+                            StageTimes* times) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
                    DsiSink* sink) const;
   FusionOptions pairsOf(std::vector<WindowRays>& cameras) const;

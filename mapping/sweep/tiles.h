@@ -83,8 +83,9 @@ class TileAccumulator {
   /// 2^kernels::kWeightBits units for each vote in the view.
   std::uint64_t resolve(float* density);
 
-  /// Adds the mean of two inputs on the same tile to a sum, with the bits of `resolve` and the
-  /// rule's mean. No votes are pending afterwards. @return the number of pixels not skipped.
+  /// Fuses two inputs of one tile by a rule and adds the result to `sum`. Bit-identical to
+  /// `resolve` of each followed by the rule. No votes are pending afterwards. @return the number of
+  /// pixels not skipped.
   /// @param rule an AND-like rule. @param sum as `density`, with kernels::kSumPadding.
   /// @param units the sum of weights of each input, in units, is added to it.
   static int addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,

@@ -9,25 +9,25 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "plugin/results/output/keyframe_writer.h"
+#include "plugin/results/output/result_folder.h"
 
 namespace efm {
 namespace {
 
 std::filesystem::path pageIn(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
-  if (!fs::exists(path)) {
+  const bool is_unfinished = !fs::exists(path / "report.json") && ResultFolder::hasPartial(path);
+  if (!fs::exists(path) && !is_unfinished) {
     throw std::runtime_error(path.string() + ": no such folder: expected one that `map` wrote");
   }
-  if (!fs::is_directory(path)) {
+  if (!fs::is_directory(path) && !is_unfinished) {
     if (path.extension() == ".html") return fs::absolute(path);
     throw std::runtime_error(path.string() +
                              ": expected a folder that `map` wrote, or its map.html");
   }
   if (fs::exists(path / "map.html")) return fs::absolute(path / "map.html").lexically_normal();
   const char* const why =
-      fs::exists(path / RunMark::kName)
-          ? ": the run that writes it was killed, or is not at its end yet"
+      is_unfinished ? ": the run that writes it was killed, or is not at its end yet"
       : fs::exists(path / "map.pcd")
           ? ": an earlier version made this map, or it was not written to its end; map it again"
           : ": expected the page that `map` writes into its folder";

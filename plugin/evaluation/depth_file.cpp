@@ -197,7 +197,7 @@ fs::path fileInFolder(const fs::path& path, std::initializer_list<const char*> n
     if (fs::is_regular_file(path / name)) return path / name;
     expected += (expected.empty() ? "" : " or ") + std::string(name);
   }
-  const bool killed = fs::exists(path / "report.partial.json");
+  const bool killed = fs::exists(path / "run.lock");
   throw std::runtime_error(
       path.string() + ": a folder without " + expected +
       (killed ? ": the run that writes it was killed, or is not at its end yet" : ""));

@@ -18,6 +18,7 @@
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
+#include "plugin/session/host_text.h"
 #include "plugin/session/mapper_driver.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
@@ -57,7 +58,7 @@ CEventFusionMapBuilder::~CEventFusionMapBuilder() {
   if (mapper_) mapper_->stop();
 }
 
-std::shared_ptr<Mapper> CEventFusionMapBuilder::mapper() const {
+std::shared_ptr<MapperDriver> CEventFusionMapBuilder::mapper() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return mapper_;
 }
@@ -71,11 +72,11 @@ std::shared_ptr<RigFromPackets> CEventFusionMapBuilder::packets() const {
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
   // Checked before the lock: the thread that holds it may wait for the end of this callback.
-  if (const auto current = mapper(); current && current->driver().runsHere()) {
+  if (const auto current = mapper(); current && current->runsHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  auto next = std::make_shared<Mapper>(
+  auto next = MapperDriver::forHost(
       builder_options,
       Mapper::Callbacks{hosts(&CEventFusionMapBuilder::callback_),
                         hosts(&CEventFusionMapBuilder::map_callback_),
@@ -88,7 +89,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   const std::lock_guard<std::mutex> lock(mutex_);
   mapper_ = std::move(next);
   packets_ = std::move(packets);
-  mapper_->driver().setSink(sink_);
+  mapper_->setSink(sink_);
   tracker_poses_ = {};
   options_ = builder_options;
   ignored_observations_ = 0;
@@ -133,16 +134,20 @@ std::function<void(const Argument&)> CEventFusionMapBuilder::hosts(
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
-  mapper_->driver().setSink(sink);
+  mapper_->setSink(sink);
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
+  forHost(HostFace::kMapper, [&] { take(observation); });
+}
+
+void CEventFusionMapBuilder::take(const mrpt::obs::CObservation::Ptr& observation) {
   if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     packets()->add(*events, options.enableMapUpdating);  // MRPT's option of every map builder
   } else if (auto pose = poseIn(*observation)) {
     const auto mapper = this->mapper();
-    pose->T_body_rig = mapper->driver().setup().T_body_rig.value_or(pose->T_body_rig);
+    pose->T_body_rig = mapper->setup().T_body_rig.value_or(pose->T_body_rig);
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       tracker_poses_.add(*observation, *pose);
@@ -163,30 +168,30 @@ void CEventFusionMapBuilder::finish() {
   } catch (const std::invalid_argument&) {
     error = std::current_exception();
   }
-  mapper()->finish();
+  forHost(HostFace::kMapper, [&] { mapper()->finish(); });
   if (error) std::rethrow_exception(error);
 }
 
 std::shared_ptr<const MapSnapshot> CEventFusionMapBuilder::snapshot() const {
-  const auto map = mapper()->keyframes();
+  const auto map = mapper()->newest(false);
   return map->points ? map : nullptr;
 }
 
-SessionStatus CEventFusionMapBuilder::status() const { return mapper()->status(); }
+SessionStatus CEventFusionMapBuilder::status() const { return mapper()->statusForHost(); }
 
 std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return ignored_observations_;
 }
 
-MapCloud::ConstPtr CEventFusionMapBuilder::points() const { return mapper()->points(); }
+MapCloud::ConstPtr CEventFusionMapBuilder::points() const { return mapper()->newest(true)->points; }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
-  return mapper()->keyframes()->trajectory;
+  return mapper()->newest(false)->trajectory;
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
-  return mapper()->keyframes()->tracker_trajectory;
+  return mapper()->newest(false)->tracker_trajectory;
 }
 
 void CEventFusionMapBuilder::loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
@@ -241,7 +246,7 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
 }
 
 /// Returns the mapper. Forgets results of an earlier mapper. The caller holds made_mutex_.
-std::shared_ptr<Mapper> CEventFusionMapBuilder::mapperOfMade() const {
+std::shared_ptr<MapperDriver> CEventFusionMapBuilder::mapperOfMade() const {
   const auto mapper = this->mapper();
   if (made_of_.lock() == mapper) return mapper;
   made_of_ = mapper;
@@ -255,7 +260,7 @@ std::shared_ptr<Mapper> CEventFusionMapBuilder::mapperOfMade() const {
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
   out_map.clear();
   const std::lock_guard<std::mutex> lock(made_mutex_);
-  const auto map = mapperOfMade()->keyframes();
+  const auto map = mapperOfMade()->newest(false);
   decltype(clouds_) clouds;  // without the clouds of keyframes that are forgotten
   for (const StoredKeyframe& keyframe : map->keyframes) {
     auto& cloud = clouds[keyframe.points];
@@ -267,14 +272,14 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  return static_cast<unsigned int>(mapper()->driver().newest(false)->keyframes.size());
+  return static_cast<unsigned int>(mapper()->newest(false)->keyframes.size());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
   std::unique_lock<std::mutex> lock(made_mutex_);
   const auto mapper = mapperOfMade();
-  const GlobalCloudOptions cloud_options = mapper->driver().cloudOptions();
-  const auto map_so_far = mapper->keyframes();
+  const GlobalCloudOptions cloud_options = mapper->usedOptions().cloud;
+  const auto map_so_far = mapper->newest(false);
   MapCloud::ConstPtr points = map_so_far->points;  // null in playback
   if (!points) {
     points = shown_points_;
@@ -297,13 +302,13 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 /// Warns once.
 void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
   if (warned_of_rounding_) return;
-  const auto warning = roundingWarning(points, mapper()->driver().cloudOptions().voxel_size_m);
+  const auto warning = roundingWarning(points, mapper()->usedOptions().cloud.voxel_size_m);
   if (warning && !warned_of_rounding_.exchange(true)) MRPT_LOG_WARN(*warning);
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  const auto [depth, planes] = mapper()->driver().newestDepth();
+  const auto [depth, planes] = mapper()->newestDepth();
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {

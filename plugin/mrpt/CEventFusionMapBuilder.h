@@ -155,13 +155,14 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
 
  private:
   void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
-  std::shared_ptr<Mapper> mapper() const;
+  void take(const mrpt::obs::CObservation::Ptr& observation);
+  std::shared_ptr<MapperDriver> mapper() const;
   std::shared_ptr<RigFromPackets> packets() const;
   template <typename Argument>
   std::function<void(const Argument&)> hosts(
       std::function<void(const Argument&)> CEventFusionMapBuilder::*callback);
   void warnOfRounding(const MapCloud& points) const;
-  std::shared_ptr<Mapper> mapperOfMade() const;
+  std::shared_ptr<MapperDriver> mapperOfMade() const;
 
   std::mutex restart_mutex_;  // held by the thread that starts over
   mutable std::mutex mutex_;  // protects all members below
@@ -173,10 +174,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
   DeadReckoning reckoning_;                  // composes the actions
-  std::shared_ptr<Mapper> mapper_;           // never null; used without the lock
+  std::shared_ptr<MapperDriver> mapper_;     // never null; used without the lock
   std::shared_ptr<RigFromPackets> packets_;  // as mapper_
   mutable std::mutex made_mutex_;  // locked before mutex_; protects the results of MRPT's getters:
-  mutable std::weak_ptr<Mapper> made_of_;
+  mutable std::weak_ptr<MapperDriver> made_of_;
   mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
       clouds_;
   mutable std::shared_ptr<mrpt::maps::CMultiMetricMap> metric_map_;

@@ -13,9 +13,10 @@
 
 namespace efm {
 
-RigFromPackets::RigFromPackets(const EventFusionOptions& options, std::shared_ptr<Mapper> mapper)
+RigFromPackets::RigFromPackets(const EventFusionOptions& options,
+                               std::shared_ptr<MapperDriver> mapper)
     : options_(options), mapper_(std::move(mapper)) {
-  const std::optional<Calibration>& given = mapper_->driver().setup().calibration;
+  const std::optional<Calibration>& given = mapper_->setup().calibration;
   if (!options.live.enabled || !given) return;
   const std::vector<RigCamera>& cameras = given->rig.cameras;
   const auto has_size = [](const RigCamera& camera) { return camera.model.width > 0; };
@@ -47,7 +48,7 @@ void RigFromPackets::check(const CObservationEvents& packet) {
     throw std::invalid_argument(fmt::format("camera {}: must be 0 or above", camera));
   }
   RigCamera calibration = calibrationOf(packet);
-  if (const auto& given = mapper_->driver().setup().calibration) {
+  if (const auto& given = mapper_->setup().calibration) {
     calibration = given->camera(static_cast<std::size_t>(camera), knownSize(calibration.model));
   }
   requireCalibrated(camera, calibration.model);
@@ -90,7 +91,7 @@ bool RigFromPackets::completes(const CObservationEvents& packet) {
       t_ns, index < offsets_ns.size() ? offsets_ns[index] : cameras_.at(camera).time_offset_ns);
   first_ns_ = std::min(first_ns_.value_or(begin_ns), begin_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
-  const auto& given = mapper_->driver().setup().calibration;
+  const auto& given = mapper_->setup().calibration;
   const bool is_known =
       *is_declared_ || offsets_ns.size() == count || (given && given->rig.cameras.size() == count);
   const bool has_no_gap = cameras_.rbegin()->first + 1 == static_cast<int>(count);
@@ -123,8 +124,8 @@ void RigFromPackets::complete() {
 }
 
 void RigFromPackets::give(Packet packet) {
-  if (!packet.maps) return mapper_->driver().skip(packet.camera, packet.events);
-  mapper_->driver().addEvents(packet.camera, std::move(packet.events), packet.complete_until_ns);
+  if (!packet.maps) return mapper_->skip(packet.camera, packet.events);
+  mapper_->addEvents(packet.camera, std::move(packet.events), packet.complete_until_ns);
 }
 
 void RigFromPackets::finish() {

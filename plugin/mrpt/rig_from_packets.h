@@ -25,7 +25,7 @@ namespace efm {
 class RigFromPackets {
  public:
   /// @throws std::invalid_argument if the cameras of the options do not fit the other options.
-  RigFromPackets(const EventFusionOptions& options, std::shared_ptr<Mapper> mapper);
+  RigFromPackets(const EventFusionOptions& options, std::shared_ptr<MapperDriver> mapper);
 
   /// @param maps false if the events are not to be mapped.
   /// @throws std::invalid_argument if the packet contradicts its camera's first packet or the
@@ -49,7 +49,7 @@ class RigFromPackets {
   [[noreturn]] void rejectWithoutNext(int camera) const;
 
   const EventFusionOptions options_;
-  const std::shared_ptr<Mapper> mapper_;
+  const std::shared_ptr<MapperDriver> mapper_;
   std::recursive_mutex mutex_;  // guards the members below; a callback may add packets
   std::map<int, RigCamera> cameras_;
   std::map<int, std::int64_t> declared_ns_;  // end of each camera's empty packets

@@ -13,7 +13,6 @@
 #include "plugin/playback/mapping_run.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/results/output/map_output.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/event_fusion_options.h"
 
@@ -80,7 +79,7 @@ struct MapResult {
 MapResult mapInto(MapJob job);
 
 /// Maps the window `options.mapper.only_window`: all that `event-fusion depth` writes.
-/// @throws as `mapInto`; Interrupted until the keyframe is made.
+/// @throws as `mapInto`; Interrupted if `stop` returns true before the keyframe is made.
 MapResult mapWindowInto(MapJob job);
 
 }  // namespace efm

@@ -15,94 +15,86 @@
 namespace efm {
 
 MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
-                       Verbosity verbosity, Receive receive, const std::string& activity)
+                       Verbosity verbosity, Host host, const std::string& activity)
     : recording_(recording),
       options_(options),
       first_(std::move(first)),
       verbosity_(verbosity),
-      receive_(std::move(receive)),
+      host_(std::move(host)),
       depths_(options.mapper.keyframe.planes, first_.chosen),
       progress_(activity, verbosity) {
   options.validate();
   first_.statistics.setWindow(statisticsOptions(options).window_s);
   Mapper::Callbacks callbacks;  // other messages are summarised in the warnings
   callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
-    if (!options_.live.enabled) return deliver(keyframe);
-    const std::lock_guard<std::mutex> lock(made_mutex_);  // called in the mapper's own thread
+    const std::lock_guard<std::mutex> lock(made_mutex_);
     made_.push_back(keyframe);
   };
   EventFusionOptions of_rig = options;
   of_rig.rig = {};  // the recording has its files
   of_rig.rig.pose_source = options.rig.pose_source;
-  mapper_ = std::make_shared<Mapper>(of_rig, std::move(callbacks));
-  mapper_->driver().setFacts(first_.quality);
-  attempt([this] {
-    give([this] { mapper_->addCameras(recording_.rig()); });
-    return true;
-  });
+  mapper_ = MapperDriver::make(of_rig, std::move(callbacks), {}, first_.quality);
+  mapper_->setSink(host_.sink);
+  attempt([this] { mapper_->addCameras(recording_.rig()); }, true);
 }
 
-/// Runs a step. @return false if it throws. The run's error is the first exception.
+/// Runs a step. The run's error is the first exception. If the mapper rejects input, the text
+/// begins with its position in the recording, and an OptionError without a section is about the
+/// input, not about options. @return false if the step throws.
 template <typename Step>
-bool MappingRun::attempt(const Step& step) {
-  bool more = false;
+bool MappingRun::attempt(const Step& step, bool is_input) {
   try {
-    more = step();
+    step();
+    return true;
   } catch (const std::exception& caught) {
-    if (!error_) noteError(caught);
-  }
-  deliverMade();
-  if (receive_error_) std::rethrow_exception(receive_error_);
-  return more;
-}
-
-/// Notes an error. If the mapper rejected a sample, the text begins with the sample's position. An
-/// OptionError without a section is then about the sample's own calibration, not about options.
-void MappingRun::noteError(const std::exception& caught) {
-  error_ = userError(caught);
-  if (!rejected_) return;
-  error_->text = recording_.position() + ": " + error_->text;
-  if (error_->wrong && error_->wrong->section.empty()) error_->wrong.reset();
-}
-
-bool MappingRun::mapNext() {
-  const bool more = attempt([this] { return feedNext(); });
-  if (progress_.due()) showProgress();
-  return more;
-}
-
-void MappingRun::finish() {
-  attempt([this] { return mapper_->finish(), false; });
-}
-
-/// Calls a function that gives data of the recording to the mapper.
-template <typename Call>
-void MappingRun::give(const Call& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument&) {
-    rejected_ = true;
-    throw;
+    if (error_) return false;
+    error_ = userError(caught);
+    if (!is_input || dynamic_cast<const std::invalid_argument*>(&caught) == nullptr) return false;
+    error_->text = recording_.position() + ": " + error_->text;
+    if (error_->wrong && error_->wrong->section.empty()) error_->wrong.reset();
+    return false;
   }
 }
 
-/// @return false at the end of the recording.
+std::optional<KeyframeDepthMap> MappingRun::next() {
+  auto made = takeMade();
+  while (!made && !ended_) {
+    stopped_ = host_.stop && host_.stop();
+    ended_ = stopped_ || !feedNext();
+    if (ended_) attempt([this] { mapper_->finish(); });
+    if (!ended_ && progress_.due()) showProgress();
+    if (!ended_ && host_.on_progress) host_.on_progress(fraction());
+    made = takeMade();
+  }
+  if (!made) return made;
+  depths_.add(*made);
+  if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(*made));
+  return made;
+}
+
+std::optional<KeyframeDepthMap> MappingRun::takeMade() {
+  const std::lock_guard<std::mutex> lock(made_mutex_);
+  if (made_.empty()) return std::nullopt;
+  std::optional<KeyframeDepthMap> first(std::move(made_.front()));
+  made_.pop_front();
+  return first;
+}
+
+/// @return false at the end of the recording, or after an error.
 bool MappingRun::feedNext() {
   std::optional<Sample> sample;
-  {
-    const SecondsScope scope(reading_.real.read, reading_.cpu.read);
+  const bool is_read = attempt([&] {
+    const StageScope scope(&reading_, &StageSeconds::read, Processors::kThis);
     sample = recording_.read();
-  }
+  });
   if (!sample) {
-    if (const std::string damage = recording_.damage(); !damage.empty() && !error_) {
-      error_ = userError(std::runtime_error(damage));
-    }
+    const std::string damage = is_read ? recording_.damage() : std::string();
+    if (!damage.empty() && !error_) error_ = userError(std::runtime_error(damage));
     return false;
   }
   if (options_.live.enabled) waitForTimeOf(*sample);
   if (std::holds_alternative<PoseSample>(*sample)) first_.statistics.add(*sample);
-  give([&] { mapper_->add(std::move(*sample)); });
-  return true;
+  return attempt([&] { mapper_->add(std::move(*sample)); }, true);
 }
 
 void MappingRun::waitForTimeOf(const Sample& sample) {
@@ -121,31 +113,9 @@ void MappingRun::waitForTimeOf(const Sample& sample) {
   std::this_thread::sleep_until(began_ + std::chrono::nanoseconds(t_ns - *first_ns_));
 }
 
-/// Delivers a keyframe. An error of writing is thrown after the step: it is no error of reading.
-void MappingRun::deliver(const KeyframeDepthMap& keyframe) {
-  if (receive_error_) return;
-  depths_.add(keyframe);
-  if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(keyframe));
-  try {
-    receive_(keyframe, *this);
-  } catch (...) {
-    receive_error_ = std::current_exception();
-  }
-}
-
-/// Delivers the keyframes of the mapper's thread in this thread, in live operation.
-void MappingRun::deliverMade() {
-  std::vector<KeyframeDepthMap> made;
-  {
-    const std::lock_guard<std::mutex> lock(made_mutex_);
-    made.swap(made_);
-  }
-  for (const KeyframeDepthMap& keyframe : made) deliver(keyframe);
-}
-
 WatchedMap MappingRun::watched(const KeyframeDepthMap& newest, double watched_s) const {
   const SessionStatus status = mapper_->status();
-  const auto map = mapper_->snapshot();
+  const auto map = mapper_->newest(true);
   const double seconds = std::max(progress_.seconds() - watched_s, 1e-3);
   const double read = static_cast<double>(status.counts.total().read);
   WatchedMap watched{newest, options_.mapper.keyframe.planes, map->points, map->trajectory, {}};
@@ -197,10 +167,10 @@ std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
   return fmt::format(
       "keyframe {} at {}: {} events, {} depths; sweep {:.3f} s, depth {:.3f} s, refinement "
       "{:.3f} s",
-      status.counts.keyframes, timeText(keyframe.window.t_ref_ns, start_ns),
+      ++returned_, timeText(keyframe.window.t_ref_ns, start_ns),
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), std::uint64_t{0}),
-      cv::countNonZero(keyframe.map.depth), now.sweep - before.sweep, now.depth - before.depth,
-      now.refine - before.refine);
+      cv::countNonZero(keyframe.map.depth), now.rays + now.sweep - before.rays - before.sweep,
+      now.depth - before.depth, now.refine - before.refine);
 }
 
 namespace {
@@ -220,7 +190,7 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
 
 }  // namespace
 
-void MappingRun::describe(MapReport& report, bool stopped) {
+void MappingRun::describe(MapReport& report) {
   SessionStatus status = mapper_->status();
   const RecordingCounts read = recording_.counts();
   const FusionMapperOptions& options = options_.mapper;
@@ -239,7 +209,7 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   report.chosen = first_.chosen;
   describeView(status.rig, options, report);
   report.sequence_maximum = options.keyframe.sequence_maximum;
-  if (stopped) report.stopped_at = fraction();
+  if (stopped_) report.stopped_at = fraction();
   report.refinement = status.refinement;
   report.times = status.times;
   report.times.real.read = reading_.real.read;
@@ -254,14 +224,14 @@ void MappingRun::describe(MapReport& report, bool stopped) {
   findings.max_pose_gap_s = options.trajectory.max_pose_gap_s;
   findings.checks = options_.checks;
   findings.voxel_size_m = report.options.cloud.voxel_size_m;
-  if (stopped && status.events) findings.until_ns = status.events->last_ns;
+  if (stopped_ && status.events) findings.until_ns = status.events->last_ns;
   findings.session = &status;
   findings.options = &options;
   findings.depths = &depths_;
   append(report.warnings, warningsOf(findings));
   append(report.notes, std::move(status.pose_notes));
   dropExplainedBlur(report.warnings);
-  if (status.counts.event_uses > 0 || error_ || stopped) return;
+  if (status.counts.event_uses > 0 || error_ || stopped_) return;
   const bool outside = !status.events && !recording_.rig().cameras.empty() &&
                        (options.interval().t0_ns || options.interval().t1_ns);
   if (status.counts.keyframes > 0) {

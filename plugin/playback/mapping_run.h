@@ -3,8 +3,8 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "event_fusion/engine.h"
 #include "plugin/playback/error_text.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/map_watcher.h"
+#include "plugin/session/mapper_driver.h"
 #include "plugin/session/recording_statistics.h"
 
 namespace efm {
@@ -29,29 +29,32 @@ struct FirstPass {
   QualityFacts quality;
 };
 
-/// Feeds a recording to a mapper sample by sample, with progress on stderr, and keeps the data for
-/// the report. In live operation the recording is played at the speed of the sensor.
+/// The keyframes of a recording, one after the other: feeds the recording to a mapper sample by
+/// sample, with progress on stderr, and keeps the data for the report. In live operation the
+/// recording is played at the speed of the sensor.
 ///
 /// If the recording is damaged, the data before the damage are mapped.
 class MappingRun {
  public:
-  /// Receives each keyframe, in order, in the caller's thread. Its exceptions end the run.
-  using Receive = std::function<void(const KeyframeDepthMap&, const MappingRun&)>;
+  struct Host {
+    std::function<bool()> stop;  ///< Returns whether the recording is to end here; may be empty.
+    std::function<void(double fraction)> on_progress;  ///< Called after each sample; may be empty.
+    DsiSink* sink = nullptr;                           ///< Receives every fused plane; may be null.
+  };
 
   /// @param recording must live longer than this object.
+  /// @param activity its name in the progress.
   /// @throws std::invalid_argument if the options are not valid.
   MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
-             Verbosity verbosity, Receive receive, const std::string& activity = "mapping");
+             Verbosity verbosity, Host host, const std::string& activity = "mapping");
 
-  Mapper& mapper() { return *mapper_; }
+  /// Maps the recording until a keyframe is made.
+  /// @return std::nullopt at the end, after an error, or if the host stopped.
+  std::optional<KeyframeDepthMap> next();
 
-  /// Maps the next sample. @return false at the end or at the damage of the recording.
-  bool mapNext();
-  /// Maps the rest.
-  void finish();
-
-  /// Returns the fraction of the work that is done, 0 to 1.
-  double fraction() const;
+  bool stopped() const { return stopped_; }
+  /// Returns the map so far.
+  std::shared_ptr<const MapSnapshot> map() const { return mapper_->newest(true); }
   /// Returns the map so far, for watchers.
   /// @param watched_s time that the watchers took: it is left out of the rates.
   WatchedMap watched(const KeyframeDepthMap& newest, double watched_s) const;
@@ -60,20 +63,16 @@ class MappingRun {
   /// Returns the damage of the recording, or why there is no keyframe; std::nullopt without error.
   const std::optional<UserError>& error() const { return error_; }
   /// Adds the results of the run to a report that has the warnings and doubts of the first look.
-  /// Call it once, after `finish`.
-  /// @param stopped true if the user ended the run.
-  void describe(MapReport& report, bool stopped);
+  /// Call it once, after the last keyframe.
+  void describe(MapReport& report);
 
  private:
   template <typename Step>
-  bool attempt(const Step& step);
-  void noteError(const std::exception& caught);
-  template <typename Call>
-  void give(const Call& call);
+  bool attempt(const Step& step, bool is_input = false);
   bool feedNext();
-  void deliver(const KeyframeDepthMap& keyframe);
-  void deliverMade();
+  std::optional<KeyframeDepthMap> takeMade();
   void waitForTimeOf(const Sample& sample);
+  double fraction() const;
   void showProgress();
   std::string keyframeLine(const KeyframeDepthMap& keyframe);
 
@@ -81,19 +80,20 @@ class MappingRun {
   const EventFusionOptions options_;
   FirstPass first_;
   const Verbosity verbosity_;
-  const Receive receive_;
+  const Host host_;
   StageTimes reading_;
   DepthStatistics depths_;
-  std::exception_ptr receive_error_;
   std::optional<UserError> error_;
-  bool rejected_ = false;                 // true if the mapper rejected a sample
-  std::mutex made_mutex_;                 // guards made_
-  std::vector<KeyframeDepthMap> made_;    // in live operation: not delivered yet
+  bool stopped_ = false;
+  bool ended_ = false;
+  std::mutex made_mutex_;  // guards made_: in live operation the mapper has a thread of its own
+  std::deque<KeyframeDepthMap> made_;     // not returned yet
   std::optional<std::int64_t> first_ns_;  // in live operation: time of the first sample
   std::chrono::steady_clock::time_point began_;
-  StageSeconds reported_;  // stage times until the last reported keyframe
+  std::uint64_t returned_ = 0;  // keyframes
+  StageSeconds reported_;       // stage times until the last reported keyframe
   Progress progress_;
-  std::shared_ptr<Mapper> mapper_;  // last, never null: its thread uses the others
+  std::shared_ptr<MapperDriver> mapper_;  // last, never null: its thread uses the others
 };
 
 /// Samples that were read once and can be read again without opening the recording, as long as

@@ -42,7 +42,7 @@ void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
 /// scene. A second choice keeps the options of the first choice if it sees no scene.
 /// @return true if all automatic options are chosen.
 bool MappingSession::chooseAutomatic() {
-  if (first_look_) return chooseFromFirstLook();
+  if (waits_for_options_) return false;
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
     const std::optional<WindowData> data = dataToChooseFrom();
@@ -59,7 +59,7 @@ bool MappingSession::chooseAutomatic() {
 }
 
 bool MappingSession::chooseFromSoFar(double at_least_s) {
-  if (!hasCameras() || !options_.automatic.any()) return false;
+  if (!hasCameras() || waits_for_options_ || !options_.automatic.any()) return false;
   std::optional<WindowData> data = mapper_.window();
   if (!data) data = mapper_.rest();
   if (!data || lengthOf(*data) < at_least_s) return false;
@@ -98,37 +98,6 @@ void MappingSession::useLook(const std::optional<WindowData>& data, Chosen looke
     noteSource(*data, choice.options);
   }
   use(std::move(choice), chosen);
-}
-
-/// Chooses in playback, after the end of the recording or if too many events are held.
-bool MappingSession::chooseFromFirstLook() {
-  const double held_mb = static_cast<double>(mapper_.heldEvents() * sizeof(Event)) / 1e6;
-  const bool ends =
-      first_look_ends_ && status_.events &&
-      secondsBetween(status_.events->first_ns, status_.events->last_ns) > kFirstWindowS;
-  if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return false;
-  RecordingSurvey survey = std::exchange(first_look_, nullptr)->finish();
-  const double seen_s = survey.duration_s.value_or(0);
-  if (!finished_) survey.duration_s.reset();
-  auto [chosen, choice, verdict] = choose(survey, options_, true);
-  mapper_.setMotion(chosen.keyframe.motion);
-  status_.pose_warnings = std::move(verdict.warnings);
-  status_.pose_notes = std::move(verdict.notes);
-  facts_ = std::move(verdict.quality);
-  if (finished_) {  // no more data: following limits would be no better
-    use(std::move(choice), chosen);
-    depth_follower_.reset();
-    return true;
-  }
-  if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-  for (ChosenOption& option : choice.options) {
-    option.reason += fmt::format(
-        "; from the first {:.3g} s of a stream{}", seen_s,
-        first_look_ends_ ? ""
-                         : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
-  }
-  use(std::move(choice), chosen);
-  return true;
 }
 
 /// Returns a window to choose from. A tracker jump or a clock reset may cut the window.
@@ -191,6 +160,17 @@ void MappingSession::fitIntoSegments(std::int64_t end_ns) {
   const double former_s = policy.window_s;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
   applyShorterWindow(former_s);
+}
+
+void MappingSession::use(NewOptions given) {
+  PoseVerdict& verdict = given.chosen.verdict;
+  waits_for_options_ = false;
+  mapper_.setMotion(given.chosen.mapper.keyframe.motion);
+  status_.pose_warnings = std::move(verdict.warnings);
+  status_.pose_notes = std::move(verdict.notes);
+  facts_ = std::move(verdict.quality);
+  use(std::move(given.chosen.choice), given.chosen.mapper);
+  if (!given.follow_depths) depth_follower_.reset();
 }
 
 /// Uses the options of a choice from now on.

@@ -21,8 +21,7 @@ void EventFusionOptions::validate() const {
                 min_keyframe_quality, "0 to 1");
 }
 
-std::size_t EventFusionOptions::movableKeyframes() const {
-  if (!refinement.enabled) return 0;
+std::size_t EventFusionOptions::keptKeyframes() const {
   return live.enabled ? static_cast<std::size_t>(live.max_keyframes) : RefinedCloud::kAll;
 }
 

@@ -92,8 +92,9 @@ struct EventFusionOptions {
   double min_keyframe_quality = 0;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.
 
-  /// Returns the number of newest keyframes that the refinement may move.
-  std::size_t movableKeyframes() const;
+  /// Return the number of newest keyframes whose points are kept, and that the refinement may move.
+  std::size_t keptKeyframes() const;
+  std::size_t movableKeyframes() const { return refinement.enabled ? keptKeyframes() : 0; }
   void validate() const;
 };
 

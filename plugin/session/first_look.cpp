@@ -19,7 +19,7 @@
 namespace efm {
 namespace {
 
-/// Time span of the poses around the middle of a sample: see `scene_depths.h`.
+/// Length of the sampled windows, seconds; they do not overlap. See `scene_depths.h`.
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 /// Events are subsampled in periods of this grid, so that the choice does not depend on packets.

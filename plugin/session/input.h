@@ -6,6 +6,7 @@
 
 #include "mapping/keyframes/mapper_counts.h"
 #include "plugin/recordings/streams/sample.h"
+#include "plugin/session/first_look.h"
 
 namespace efm {
 
@@ -26,8 +27,14 @@ struct Jump {
 /// All clocks went back: what follows is of the new clock.
 struct ClockReset {};
 
+/// Options that the caller chose, from data that it has seen before or beside the session.
+struct NewOptions {
+  Chosen chosen;
+  bool follow_depths = false;  ///< The depth limits follow the keyframes: more data will come.
+};
+
 /// Input of a session. A break is a value between the data before it and the data behind it. See
 /// README.md for the rules of the breaks.
-using Input = std::variant<Rig, EventPacket, PoseSample, Missing, Jump, ClockReset>;
+using Input = std::variant<Rig, EventPacket, PoseSample, Missing, Jump, ClockReset, NewOptions>;
 
 }  // namespace efm

@@ -25,13 +25,12 @@ std::string errorText() {
 }  // namespace
 
 LiveMapper::LiveMapper(const EventFusionOptions& options, Callbacks callbacks,
-                       const std::vector<StoredKeyframe>& earlier)
-    : MapperDriver(options, std::move(callbacks), earlier), gate_(options.live) {
-  forgetOldest();
+                       const std::vector<StoredKeyframe>& earlier, QualityFacts facts)
+    : MapperDriver(options, std::move(callbacks), earlier, std::move(facts), ChoiceBy::kSession),
+      gate_(options.live) {
   status_ = session_.status();
-  used_options_ = session_.usedOptions();
-  used_cloud_ = session_.cloudOptions();
-  map_ = makeSnapshot(true);
+  used_options_ = session_.options();
+  map_ = session_.snapshot(true);
   thread_ = std::thread([this] {  // waits: no input before the constructor returns
     worker_ = std::this_thread::get_id();
     run();
@@ -42,8 +41,10 @@ LiveMapper::LiveMapper(const EventFusionOptions& options, Callbacks callbacks,
 
 std::shared_ptr<MapperDriver> LiveMapper::make(const EventFusionOptions& options,
                                                Callbacks callbacks,
-                                               const std::vector<StoredKeyframe>& earlier) {
-  const auto mapper = std::make_shared<LiveMapper>(options, std::move(callbacks), earlier);
+                                               const std::vector<StoredKeyframe>& earlier,
+                                               QualityFacts facts) {
+  const auto mapper =
+      std::make_shared<LiveMapper>(options, std::move(callbacks), earlier, std::move(facts));
   mapper->self_ = mapper;
   return {mapper.get(), [mapper](MapperDriver*) {
             mapper->stop();
@@ -106,6 +107,7 @@ bool LiveMapper::takeAndMap() {
     attempt(Fault::kMapping, "the end of the input", [&] {
       try {
         session_.finish();
+      } catch (const std::invalid_argument&) {  // a pose, which counts as rejected
       } catch (...) {
         error = std::current_exception();
         throw;
@@ -141,28 +143,24 @@ bool LiveMapper::mapNext() {
   });
   std::optional<KeyframeDepthMap> keyframe;
   const bool mapped = attempt(Fault::kMapping, "a keyframe", [&] { keyframe = mapWindow(); });
-  if (!keyframe && (mapped || !session_.dropFailedWindow())) return false;
-  std::vector<std::string> warnings;
-  if (keyframe) {
-    map_changed_ = true;
-    attempt(Fault::kMapping, "a warning", [&] { warnings = warningsOfSilence(*keyframe); });
-    forgetOldest();
-    publishMap(false);
+  if (!keyframe && !mapped && session_.dropFailedWindow()) {
+    publishState();
+    return true;
   }
+  if (!keyframe) {
+    attempt(Fault::kMapping, "the input that waits", [&] { session_.limitWaits(); });
+    return false;
+  }
+  std::vector<std::string> warnings;
+  map_changed_ = true;
+  attempt(Fault::kMapping, "a warning", [&] { warnings = warningsOfSilence(*keyframe); });
+  publishMap(false);
   publishState();
   for (const std::string& text : warnings) warn(text);
-  if (keyframe && callbacks_.on_keyframe) {
+  if (callbacks_.on_keyframe) {
     callBack("the callback of a keyframe", [&] { callbacks_.on_keyframe(*keyframe); });
   }
   return true;
-}
-
-/// Forgets the clouds of the oldest keyframes if there are too many.
-void LiveMapper::forgetOldest() {
-  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
-  const auto most = static_cast<std::size_t>(options_.live.max_keyframes);
-  if (keyframes.size() <= most) return;
-  keyframes.erase(keyframes.begin(), keyframes.end() - static_cast<std::ptrdiff_t>(most));
 }
 
 /// Renews the snapshot, unless this would take too much of the time.
@@ -172,7 +170,7 @@ void LiveMapper::publishMap(bool at_once) {
   if (!is_due && !at_once) return;
   std::shared_ptr<const MapSnapshot> made;
   const bool done =
-      attempt(Fault::kMapping, "the snapshot of the map", [&] { made = makeSnapshot(true); });
+      attempt(Fault::kMapping, "the snapshot of the map", [&] { made = session_.snapshot(true); });
   map_renewed_ = Clock::now();
   map_cost_ = map_renewed_ - begin;
   if (!done) return;  // the next try costs as much
@@ -198,8 +196,7 @@ void LiveMapper::publishState() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       status_ = std::move(status);
-      used_options_ = session_.usedOptions();
-      used_cloud_ = session_.cloudOptions();
+      used_options_ = session_.options();
     }
     if (!failure.empty()) warn(failure);
   });
@@ -216,7 +213,7 @@ SessionStatus LiveMapper::status() const {
   LiveStatus& live = *status.live;
   for (const auto& [camera, counts] : live.cameras) cameras[camera].lost = counts.lost;
   live.cameras = std::move(cameras);
-  live.rejected_poses += live_.rejected_poses + rejected_poses;
+  live.rejected_poses += rejected_poses;
   live.late_events = late_events;
   live.errors = live_.errors;
   live.last_error = live_.last_error;
@@ -228,14 +225,9 @@ std::shared_ptr<const MapSnapshot> LiveMapper::newest(bool /*with_points*/) {
   return map_;
 }
 
-FusionMapperOptions LiveMapper::usedOptions() const {
+EventFusionOptions LiveMapper::usedOptions() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return used_options_;
-}
-
-GlobalCloudOptions LiveMapper::cloudOptions() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return used_cloud_;
 }
 
 bool LiveMapper::hasEnded() const {
@@ -278,7 +270,6 @@ void LiveMapper::noteError(const char* doing, Fault fault) noexcept {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_input) ++live_.errors;
-    if (fault == Fault::kPose) ++live_.rejected_poses;
   }
   try {
     const std::string text = errorText();

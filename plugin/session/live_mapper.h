@@ -25,19 +25,19 @@ namespace efm {
 class LiveMapper : public MapperDriver {
  public:
   LiveMapper(const EventFusionOptions& options, Callbacks callbacks,
-             const std::vector<StoredKeyframe>& earlier);
+             const std::vector<StoredKeyframe>& earlier, QualityFacts facts);
   static std::shared_ptr<MapperDriver> make(const EventFusionOptions& options, Callbacks callbacks,
-                                            const std::vector<StoredKeyframe>& earlier);
+                                            const std::vector<StoredKeyframe>& earlier,
+                                            QualityFacts facts);
   ~LiveMapper() override;
 
   void skip(int camera, const std::vector<Event>& events) override { gate_.skip(camera, events); }
   void finish() override;
   void stop() override;
   bool runsHere() const override { return std::this_thread::get_id() == worker_; }
-  void setFacts(QualityFacts facts) override { session_.setFacts(std::move(facts)); }
   SessionStatus status() const override;
   std::shared_ptr<const MapSnapshot> newest(bool with_points) override;
-  GlobalCloudOptions cloudOptions() const override;
+  EventFusionOptions usedOptions() const override;
 
  protected:
   void useRig(const Rig& rig) override { gate_.add(rig); }
@@ -47,7 +47,6 @@ class LiveMapper : public MapperDriver {
   }
   void usePacket(EventPacket packet) override { gate_.add(std::move(packet)); }
   void usePose(PoseSample pose) override { gate_.add(std::move(pose)); }
-  FusionMapperOptions usedOptions() const override;
   bool hasEnded() const override;
 
  private:
@@ -61,7 +60,6 @@ class LiveMapper : public MapperDriver {
   void mapDue();
   bool mapNext();
   void endRun(std::exception_ptr error);
-  void forgetOldest();
   void publishState();
   void publishMap(bool at_once);
   template <typename Step>
@@ -93,9 +91,8 @@ class LiveMapper : public MapperDriver {
   mutable std::mutex mutex_;  // guards the members below; held for copies only
   std::condition_variable ended_changed_;
   SessionStatus status_;
-  FusionMapperOptions used_options_;  // with the chosen options
-  GlobalCloudOptions used_cloud_;     // as used_options_
-  LiveStatus live_;                   // its errors
+  EventFusionOptions used_options_;
+  LiveStatus live_;  // its errors
   std::shared_ptr<const MapSnapshot> map_;
   bool ended_ = false;
   std::exception_ptr end_error_;

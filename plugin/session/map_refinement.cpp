@@ -180,16 +180,15 @@ bool MapRefinement::refine(Task& task) {
 /// Runs a step of the refiner, and publishes its results. Counts errors.
 template <typename Step>
 void MapRefinement::work(const Step& step) {
-  double seconds = 0;
-  double cpu_seconds = 0;
+  StageTimes times;
   try {
-    const SecondsScope scope(seconds, cpu_seconds);
+    const StageScope scope(&times, &StageSeconds::refine, Processors::kThis);
     step();
   } catch (...) {
     fail(std::current_exception());
   }
   try {
-    publish(seconds, cpu_seconds);
+    publish(times.real.refine, times.cpu.refine);
   } catch (...) {
     fail(std::current_exception());
   }

@@ -10,21 +10,11 @@ namespace {
 
 constexpr HostFace kFace = HostFace::kMapper;
 
-Mapper::Callbacks forHost(Mapper::Callbacks callbacks) {
-  for (auto* log : {&callbacks.warn, &callbacks.info}) {
-    if (!*log) continue;
-    *log = [log = std::move(*log)](const std::string& text) { log(hostText(text, kFace)); };
-  }
-  return callbacks;
-}
-
 }  // namespace
 
 Mapper::Mapper(const Options& options, Callbacks callbacks,
                const std::vector<StoredKeyframe>& earlier)
-    : driver_(forHost(kFace, [&] {
-        return MapperDriver::make(options.values(), forHost(std::move(callbacks)), earlier);
-      })) {}
+    : driver_(MapperDriver::forHost(options.values(), std::move(callbacks), earlier)) {}
 
 Mapper::~Mapper() = default;
 
@@ -54,13 +44,7 @@ void Mapper::stop() { driver_->stop(); }
 
 std::shared_ptr<const MapSnapshot> Mapper::snapshot() const { return driver_->newest(true); }
 std::shared_ptr<const MapSnapshot> Mapper::keyframes() const { return driver_->newest(false); }
-SessionStatus Mapper::status() const {
-  SessionStatus status = driver_->status();
-  status.pose_warnings = hostTexts(std::move(status.pose_warnings), kFace);
-  status.pose_notes = hostTexts(std::move(status.pose_notes), kFace);
-  if (status.live) status.live->last_error = hostText(status.live->last_error, kFace);
-  return status;
-}
+SessionStatus Mapper::status() const { return driver_->statusForHost(); }
 std::vector<Warning> Mapper::warnings() const { return hostTexts(driver_->warnings(), kFace); }
 
 }  // namespace efm

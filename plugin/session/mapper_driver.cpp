@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/session/host_text.h"
 #include "plugin/session/live_mapper.h"
 #include "plugin/session/playback_mapper.h"
 
@@ -32,24 +33,35 @@ std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapper
 
 std::shared_ptr<MapperDriver> MapperDriver::make(const EventFusionOptions& options,
                                                  Callbacks callbacks,
-                                                 const std::vector<StoredKeyframe>& earlier) {
-  if (options.live.enabled) return LiveMapper::make(options, std::move(callbacks), earlier);
-  return std::make_shared<PlaybackMapper>(options, std::move(callbacks), earlier);
+                                                 const std::vector<StoredKeyframe>& earlier,
+                                                 QualityFacts facts) {
+  if (options.live.enabled) {
+    return LiveMapper::make(options, std::move(callbacks), earlier, std::move(facts));
+  }
+  return std::make_shared<PlaybackMapper>(options, std::move(callbacks), earlier, std::move(facts));
+}
+
+std::shared_ptr<MapperDriver> MapperDriver::forHost(const EventFusionOptions& options,
+                                                    Callbacks callbacks,
+                                                    const std::vector<StoredKeyframe>& earlier) {
+  for (auto* log : {&callbacks.warn, &callbacks.info}) {
+    if (!*log) continue;
+    *log = [log = std::move(*log)](const std::string& text) {
+      log(hostText(text, HostFace::kMapper));
+    };
+  }
+  return efm::forHost(HostFace::kMapper,
+                      [&] { return make(options, std::move(callbacks), earlier); });
 }
 
 MapperDriver::MapperDriver(const EventFusionOptions& options, Callbacks callbacks,
-                           const std::vector<StoredKeyframe>& earlier)
+                           const std::vector<StoredKeyframe>& earlier, QualityFacts facts,
+                           ChoiceBy choice_by)
     : options_(options),
       callbacks_(std::move(callbacks)),
       setup_(readRigSetup(options.rig.calibration, options.rig.hand_eye)),
-      session_(options),
-      statistics_(statisticsOptions(options)) {
-  for (const StoredKeyframe& keyframe : earlier) {
-    session_.insertEarlier(pointsInWorld(*keyframe.points, keyframe.T_world_ref),
-                           keyframe.T_world_ref);
-    keep(keyframe);
-  }
-}
+      session_(options, earlier, std::move(facts), choice_by),
+      statistics_(statisticsOptions(options)) {}
 
 // --- Input ---
 
@@ -120,11 +132,6 @@ void MapperDriver::setSink(DsiSink* sink) {
   sink_ = sink;
 }
 
-void MapperDriver::setClock(ProcessorClock clock) {
-  const std::lock_guard<std::mutex> lock(newest_mutex_);
-  clock_ = std::move(clock);
-}
-
 // --- Mapping ---
 
 void MapperDriver::feed(Input input) {
@@ -138,63 +145,17 @@ void MapperDriver::feed(Input input) {
 
 std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
   DsiSink* sink = nullptr;
-  ProcessorClock clock;
   {
     const std::lock_guard<std::mutex> lock(newest_mutex_);
     sink = sink_;
-    clock = clock_;
   }
-  const std::size_t kept = map_so_far_.trajectory.size();
-  const std::size_t kept_keyframes = map_so_far_.keyframes.size();
-  const auto store = [this](const KeyframeDepthMap& made, const std::vector<ViewPoint>& points) {
-    keep({made.window.t_ref_ns, made.T_world_ref,
-          std::make_shared<const std::vector<ViewPoint>>(points)});
-  };
-  std::optional<KeyframeDepthMap> keyframe;
-  try {
-    keyframe = session_.next(sink, clock, store);
-  } catch (...) {  // the session does not have this keyframe
-    map_so_far_.trajectory.resize(kept);
-    map_so_far_.tracker_trajectory.resize(std::min(map_so_far_.tracker_trajectory.size(), kept));
-    map_so_far_.keyframes.resize(std::min(map_so_far_.keyframes.size(), kept_keyframes));
-    throw;
-  }
+  std::optional<KeyframeDepthMap> keyframe = session_.next(sink);
   if (!keyframe) return keyframe;
   const std::lock_guard<std::mutex> lock(newest_mutex_);
   newest_depth_ = keyframe->map.depth;
   pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
-  newest_planes_ = session_.newestPlanes();
+  newest_planes_ = keyframe->planes;
   return keyframe;
-}
-
-/// Adds a keyframe to the map so far. If memory runs out, the caller removes the keyframe.
-void MapperDriver::keep(StoredKeyframe keyframe) {
-  const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
-  map_so_far_.trajectory.push_back(pose);
-  map_so_far_.tracker_trajectory.push_back(pose);
-  map_so_far_.keyframes.push_back(std::move(keyframe));
-}
-
-std::shared_ptr<MapSnapshot> MapperDriver::makeSnapshot(bool with_points) {
-  session_.applyPending();
-  const std::vector<Rigid3>& T_world_ref = session_.T_world_ref();
-  std::vector<StampedPose>& trajectory = map_so_far_.trajectory;
-  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
-  const std::size_t earlier = trajectory.size() - T_world_ref.size();
-  const std::size_t forgotten = trajectory.size() - keyframes.size();
-  for (std::size_t i = earlier; i < trajectory.size(); ++i) {
-    if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
-    trajectory[i].T_world_rig = T_world_ref[i - earlier];
-    if (i >= forgotten) keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
-  }
-  for (const std::size_t left_out : session_.leftOut()) {
-    if (earlier + left_out < forgotten) continue;
-    keyframes[earlier + left_out - forgotten].points =
-        std::make_shared<const std::vector<ViewPoint>>();
-  }
-  auto map = std::make_shared<MapSnapshot>(map_so_far_);
-  if (with_points) map->points = session_.cloud().points();
-  return map;
 }
 
 // --- Results ---
@@ -204,6 +165,14 @@ std::pair<cv::Mat1f, DepthPlanesOptions> MapperDriver::newestDepth() const {
   return {newest_depth_, newest_planes_};
 }
 
+SessionStatus MapperDriver::statusForHost() const {
+  SessionStatus status = this->status();
+  status.pose_warnings = hostTexts(std::move(status.pose_warnings), HostFace::kMapper);
+  status.pose_notes = hostTexts(std::move(status.pose_notes), HostFace::kMapper);
+  if (status.live) status.live->last_error = hostText(status.live->last_error, HostFace::kMapper);
+  return status;
+}
+
 std::vector<Warning> MapperDriver::warnings() {
   const bool ended = hasEnded();
   PixelSizes pixels;
@@ -211,7 +180,8 @@ std::vector<Warning> MapperDriver::warnings() {
     const std::lock_guard<std::mutex> lock(newest_mutex_);
     pixels = pixel_sizes_;
   }
-  const FusionMapperOptions options = usedOptions();
+  const EventFusionOptions used = usedOptions();
+  const FusionMapperOptions& options = used.mapper;
   const SessionStatus state = status();
   RecordingStatistics statistics;
   {
@@ -225,7 +195,7 @@ std::vector<Warning> MapperDriver::warnings() {
   findings.checks = options_.checks;
   findings.session = &state;
   findings.options = &options;
-  findings.voxel_size_m = cloudOptions().voxel_size_m;
+  findings.voxel_size_m = used.cloud.voxel_size_m;
   if (ended) findings.pixels = &pixels;
   std::vector<Warning> warnings = warningsOf(findings);
   double reach_m = 4 * options.keyframe.planes.max_depth_m;  // of points around the keyframes
@@ -256,19 +226,20 @@ std::vector<std::string> MapperDriver::warningsOfSilence(const KeyframeDepthMap&
 
 MapperDriver::News MapperDriver::takeNews() {
   News news;
-  const std::uint64_t choices = session_.choices();
-  const bool is_new_choice = std::exchange(told_choices_, choices) != choices;
-  const bool is_first_blur = session_.correctedKeyframes() > 0 && !std::exchange(blur_told_, true);
-  if (is_new_choice) news.choice = session_.status();
+  SessionStatus status = session_.status();
+  const bool is_first_blur = status.counts.motion.corrected > 0 && !std::exchange(blur_told_, true);
   if (is_first_blur) {
-    news.blur = session_.status();
-    news.options = session_.usedOptions();
+    news.blur = status;
+    news.options = session_.options();
+  }
+  if (std::exchange(told_choices_, status.choices) != status.choices) {
+    news.choice = std::move(status);
   }
   return news;
 }
 
 void MapperDriver::tell(const News& news, const Say& say) const {
-  if (news.blur) say(callbacks_.info, motionText(*news.blur, news.options));
+  if (news.blur) say(callbacks_.info, motionText(*news.blur, news.options.mapper));
   if (!news.choice) return;
   const SessionStatus& status = *news.choice;
   say(callbacks_.info, choiceText(status));
@@ -279,7 +250,7 @@ void MapperDriver::tell(const News& news, const Say& say) const {
 }
 
 void MapperDriver::tellOfEnd(const Say& say) {
-  if (const auto warning = noKeyframe(status(), usedOptions())) {
+  if (const auto warning = noKeyframe(status(), usedOptions().mapper)) {
     say(callbacks_.warn, warning->name + ": " + warning->text);
   }
   for (const Warning& warning : warnings()) {

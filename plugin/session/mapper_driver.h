@@ -33,8 +33,15 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
 
   /// Makes the driver for the options. Its callbacks may drop the last reference to it: it ends
   /// after the callback.
+  /// @param facts what a first look of the host found.
   static std::shared_ptr<MapperDriver> make(const EventFusionOptions& options, Callbacks callbacks,
-                                            const std::vector<StoredKeyframe>& earlier);
+                                            const std::vector<StoredKeyframe>& earlier = {},
+                                            QualityFacts facts = {});
+  /// Makes the driver of a host other than the program: errors, the log and the status have
+  /// hostText.
+  static std::shared_ptr<MapperDriver> forHost(const EventFusionOptions& options,
+                                               Callbacks callbacks,
+                                               const std::vector<StoredKeyframe>& earlier);
   virtual ~MapperDriver() = default;
   MapperDriver(const MapperDriver&) = delete;
   MapperDriver& operator=(const MapperDriver&) = delete;
@@ -54,25 +61,21 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
   /// The current keyframe may still use the former sink.
   void setSink(DsiSink* sink);
-  /// Tells what a first look of the host found.
-  virtual void setFacts(QualityFacts facts) = 0;
-  /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
-  /// processor time of the process.
-  void setClock(ProcessorClock clock);
 
   /// Returns the files of the rig that the options name.
   const RigSetup& setup() const { return setup_; }
   virtual SessionStatus status() const = 0;
+  SessionStatus statusForHost() const;
   std::vector<Warning> warnings();
   virtual std::shared_ptr<const MapSnapshot> newest(bool with_points) = 0;
-  /// Returns the options of the map, with the chosen voxel size.
-  virtual GlobalCloudOptions cloudOptions() const = 0;
+  /// Returns the options in use, with the chosen values.
+  virtual EventFusionOptions usedOptions() const = 0;
   /// Returns the newest keyframe's depth map (empty before the first one), and its depth planes.
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
 
  protected:
   MapperDriver(const EventFusionOptions& options, Callbacks callbacks,
-               const std::vector<StoredKeyframe>& earlier);
+               const std::vector<StoredKeyframe>& earlier, QualityFacts facts, ChoiceBy choice_by);
 
   // Functions of the driver's two kinds.
   /// Gives the cameras to the session, or to the gate before it.
@@ -81,7 +84,6 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
                          std::optional<std::int64_t> complete_until_ns) = 0;
   virtual void usePacket(EventPacket packet) = 0;
   virtual void usePose(PoseSample pose) = 0;
-  virtual FusionMapperOptions usedOptions() const = 0;
   /// Returns what the check of own data has found.
   virtual void describeInput(RecordingCounts& /*counts*/) const {}
   virtual bool hasEnded() const = 0;
@@ -91,15 +93,13 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   void feed(Input input);
   /// Maps the next window. After an exception the map so far is as before.
   std::optional<KeyframeDepthMap> mapWindow();
-  /// Makes a snapshot. Moves cloud and keyframes to their refined poses before, so that they agree.
-  std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
   /// Returns at most one warning per camera. The status counts the keyframes without its events.
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
 
   /// What the log says of a new choice of options, and of the first blur.
   struct News {
     std::optional<SessionStatus> choice, blur;
-    FusionMapperOptions options;
+    EventFusionOptions options;
   };
   News takeNews();
   /// Tells the host. @param say calls a callback of the log.
@@ -114,7 +114,6 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   const Callbacks callbacks_;
   const RigSetup setup_;
   MappingSession session_;
-  MapSnapshot map_so_far_;               // without points
   mutable std::mutex cameras_mutex_;     // guards given_rig_ and rig_is_fixed_
   Rig given_rig_;                        // as the host gave it
   bool rig_is_fixed_ = false;            // the session knows the cameras
@@ -123,7 +122,6 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
 
  private:
   void fixRig(const Rig& given);
-  void keep(StoredKeyframe keyframe);
 
   std::set<int> silent_cameras_;  // cameras without events that were logged
   std::uint64_t told_choices_ = 0;
@@ -131,7 +129,6 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
 
   mutable std::mutex newest_mutex_;  // guards the members below; held for copies only
   DsiSink* sink_ = nullptr;
-  ProcessorClock clock_ = processSeconds;
   PixelSizes pixel_sizes_;
   cv::Mat1f newest_depth_;
   DepthPlanesOptions newest_planes_;

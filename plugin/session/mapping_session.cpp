@@ -13,56 +13,30 @@
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
-namespace {
 
-/// Adds input to the first look. Input that the first look rejects is rejected by the mapping, too.
-template <typename Add>
-void look(Add add) {
-  try {
-    add();
-  } catch (const std::invalid_argument&) {
-  }
-}
-
-/// Measures the stages of the mapping, which do not overlap.
-class StageTimer : public StageHook {
- public:
-  /// @param clock processor time of all threads of the mapping.
-  StageTimer(StageTimes& times, const ProcessorClock& clock) : times_(times), clock_(clock) {}
-
-  void begin(Stage stage) override {
-    double StageSeconds::*const sum = stage == Stage::kFilter  ? &StageSeconds::filter
-                                      : stage == Stage::kSweep ? &StageSeconds::sweep
-                                                               : &StageSeconds::depth;
-    scope_.emplace(times_.real.*sum, times_.cpu.*sum, clock_);
-  }
-  void end(Stage) override { scope_.reset(); }
-
- private:
-  StageTimes& times_;
-  const ProcessorClock& clock_;
-  std::optional<SecondsScope> scope_;
-};
-
-}  // namespace
-
-MappingSession::MappingSession(const EventFusionOptions& options)
+MappingSession::MappingSession(const EventFusionOptions& options,
+                               const std::vector<StoredKeyframe>& earlier, QualityFacts facts,
+                               ChoiceBy choice_by)
     : automatic_(options.automatic),
       options_(options),
       pose_source_(options.rig.pose_source),
       mapper_(mapperOptions(options)),
-      cloud_(options.cloud, options.movableKeyframes()) {
-  if (!options.live.enabled && options.automatic.any()) {  // live operation cannot look ahead
-    first_look_ = std::make_unique<FirstLook>(options);
-  }
+      waits_for_options_(choice_by == ChoiceBy::kCaller && options.automatic.any()),
+      cloud_(options.cloud, options.movableKeyframes()),
+      facts_(std::move(facts)) {
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }
+  for (const StoredKeyframe& keyframe : earlier) {
+    automatic_.voxel_size_m = options_.automatic.voxel_size_m = false;
+    cloud_.insertFixed(pointsInWorld(*keyframe.points, keyframe.T_world_ref), keyframe.T_world_ref);
+    keep(keyframe);
+  }
+  forgetOldest();
 }
 
 void MappingSession::addCameras(const Rig& rig) {
-  const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
-  if (first_look_) first_look_->take(rig);
+  const StageScope scope(&status_.times, &StageSeconds::tables);
   for (const RigCamera& camera : rig.cameras) mapper_.addCamera(camera);
 }
 
@@ -72,6 +46,7 @@ void MappingSession::add(Input input) {
   if (auto* packet = std::get_if<EventPacket>(&input)) addEvents(std::move(*packet));
   if (const auto* pose = std::get_if<PoseSample>(&input)) addPose(*pose);
   if (const auto* missing = std::get_if<Missing>(&input)) noteMissing(*missing);
+  if (auto* chosen = std::get_if<NewOptions>(&input)) use(std::move(*chosen));
   if (std::holds_alternative<ClockReset>(input)) break_ = ClockReset{};
   const auto* const jump = std::get_if<Jump>(&input);
   if (!jump) return;
@@ -80,7 +55,6 @@ void MappingSession::add(Input input) {
 }
 
 void MappingSession::addEvents(EventPacket packet) {
-  if (first_look_) look([&] { first_look_->addEvents(packet); });
   const int camera = packet.camera;
   const std::uint64_t complete = mapper_.readEvents() + packet.events.size();
   try {
@@ -98,7 +72,7 @@ void MappingSession::feed(EventPacket packet) {
   const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
   {
-    const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
+    const StageScope scope(&status_.times, &StageSeconds::filter, Processors::kThis);
     mapper_.addEvents(packet.camera, std::move(packet.events));
   }
   if (packet.complete_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.complete_until_ns);
@@ -114,15 +88,10 @@ void MappingSession::feed(EventPacket packet) {
   extend(status_.events, last_ns + offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   dropOverdue(*newest_begin_ns_);
-  if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs ||
-      (options_.live.enabled &&
-       static_cast<double>(mapper_.heldEvents()) > options_.live.queueEvents() / 2)) {
-    useSelected();
-  }
+  if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs) useSelected();
 }
 
 void MappingSession::addPose(const PoseSample& sample) {
-  if (first_look_) look([&] { first_look_->addPose(sample); });
   const PoseSourceId& source = sample.source;
   for (const StampedPose& pose : pose_source_.add(source, {sample.t_ns, sample.T_world_rig()})) {
     usePose(pose);
@@ -143,21 +112,25 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
 }
 
 void MappingSession::usePose(const StampedPose& pose) {
-  mapper_.addPose(pose);
+  try {
+    mapper_.addPose(pose);
+  } catch (const std::invalid_argument&) {
+    ++live_.rejected_poses;
+    throw;
+  }
   extend(status_.poses, pose.t_ns);
   newest_pose_ns_ = std::max(newest_pose_ns_.value_or(pose.t_ns), pose.t_ns);
 }
 
 /// Selects a source of poses, if there is none yet, and uses its waiting poses, also after a
-/// rejected pose. In playback, throws the first error at the end.
+/// rejected pose. Throws the first error at the end.
 void MappingSession::useSelected() {
   std::exception_ptr error;
   for (const StampedPose& pose : pose_source_.select()) {
     try {
       usePose(pose);
     } catch (const std::invalid_argument&) {
-      ++live_.rejected_poses;
-      if (!options_.live.enabled && !error) error = std::current_exception();
+      if (!error) error = std::current_exception();
     }
   }
   if (error) std::rethrow_exception(error);
@@ -165,7 +138,6 @@ void MappingSession::useSelected() {
 
 void MappingSession::noteMissing(const Missing& missing) {
   constexpr double kEnoughS = 0.2;
-  first_look_ends_ = true;
   if (missing.reason == DropReason::kOverload) chooseFromSoFar(kEnoughS);
   Missing& noted = missing_.try_emplace(missing.camera, missing).first->second;
   noted.until_ns = std::max(noted.until_ns, missing.until_ns);
@@ -230,6 +202,7 @@ void MappingSession::restartMapper() {
   newest_pose_ns_.reset();
   missing_.clear();
   noises_.clear();
+  pose_source_.forgetWaiting();
   no_scene_since_ns_.reset();
   events_without_scene_ = 0;
   look_again_ns_ = kMinTimeNs;
@@ -240,21 +213,13 @@ void MappingSession::finish() {
   finished_ = true;
   dropOverdue(kMaxTimeNs);
   missing_.clear();
-  std::exception_ptr error;
-  try {
-    useSelected();
-  } catch (const std::invalid_argument&) {  // the other poses are used
-    error = std::current_exception();
-  }
   mapper_.finish();
-  if (error) std::rethrow_exception(error);
+  useSelected();
 }
 
-/// In live operation, limits the time that events and poses wait for each other if no window can be
-/// mapped: drops the windows whose poses are overdue, and treats overdue events as silence.
 void MappingSession::limitWaits() {
   constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
-  if (finished_ || !options_.live.enabled) return;
+  if (finished_) return;
   pose_source_.limitWaiting(kMaxEventWaitNs);
   std::optional<std::int64_t> newest_ns = pose_source_.waitingNs();
   if (newest_pose_ns_) {
@@ -278,6 +243,7 @@ void MappingSession::limitWaits() {
 void MappingSession::limitHeld(double max_events) {
   const auto is_excess = [&] { return static_cast<double>(mapper_.heldEvents()) > max_events; };
   constexpr double kEnoughS = 0.001;
+  if (static_cast<double>(mapper_.heldEvents()) > options_.live.queueEvents() / 2) useSelected();
   if (is_excess() && chooseFromSoFar(kEnoughS)) return;
   while (is_excess() && dropOldestWindow()) {
   }
@@ -327,37 +293,23 @@ void MappingSession::dropOlderHalf() {
   throw std::invalid_argument(why);
 }
 
-void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
-                                   const Rigid3& T_world_ref) {
-  automatic_.voxel_size_m = options_.automatic.voxel_size_m = false;
-  cloud_.insertFixed(points, T_world_ref);
-}
-
 bool MappingSession::dropFailedWindow() {
   return std::exchange(keyframe_lost_, false) || mapper_.dropFailedWindow();
 }
 
-std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,
-                                                     const KeyframeStore& store) {
+std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
   keyframe_lost_ = false;
-  if (!hasCameras() || !chooseAutomatic()) {
-    limitWaits();
-    return std::nullopt;
-  }
-  StageTimer timer(status_.times, clock);
-  const DepthPlanesOptions used = planes();
-  std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
-  while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &timer);
-  if (!keyframe) limitWaits();
+  if (!hasCameras() || !chooseAutomatic()) return std::nullopt;
+  std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &status_.times);
+  while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &status_.times);
   if (!keyframe && finished_) leaveOutBad(quality_.keyframes());
   if (keyframe) {
-    newest_planes_ = used;
     try {
       if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
         mapper_.setPlanes(depth_follower_->planes());
       }
       if (depth_follower_) lookAgain(keyframe->window);
-      insert(*keyframe, store);
+      insert(*keyframe);
     } catch (...) {
       mapper_.loseKeyframe();
       keyframe_lost_ = true;
@@ -365,15 +317,15 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
     }
   } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {
     refinement_->finish();
-    applyPending();
+    moveKeyframes(0);
   }
   if (!keyframe && refinement_) refinement_->throwFailure();
   return keyframe;
 }
 
-/// Inserts a keyframe into the cloud, refines it, and moves keyframes to their refined poses. Cloud
-/// and refinement number keyframes alike: after an error neither has the keyframe.
-void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& store) {
+/// Inserts a keyframe into the cloud, refines it, and moves keyframes to their refined poses. Map,
+/// cloud and refinement number keyframes alike: after an error none has the keyframe.
+void MappingSession::insert(KeyframeDepthMap& keyframe) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
   if (quality_.keyframes() > 0) leaveOutBad(quality_.keyframes() - 1);
   QualityStatistics judged = quality_;
@@ -384,21 +336,26 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
                              selectedCameras(mapper_.rig(), options_.mapper.cameras).size());
   }
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
-  T_odom_ref_.push_back(T_odom_ref);
+  const std::size_t kept = map_.trajectory.size();
+  const std::size_t kept_keyframes = map_.keyframes.size();
+  const std::size_t inserted = cloud_.T_world_ref().size();
   try {
     std::vector<ViewPoint> points =
         options_.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe);
-    if (store) store(keyframe, points);
+    keep({keyframe.window.t_ref_ns, T_odom_ref,
+          std::make_shared<const std::vector<ViewPoint>>(points)});
     Rigid3 T_world_ref = refinement_ ? refinement_->predict(T_odom_ref) : T_odom_ref;
     {
-      const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
+      const StageScope scope(&status_.times, &StageSeconds::map, Processors::kThis);
       cloud_.insert(std::move(points), T_world_ref);
     }
     if (refinement_) T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
     keyframe.T_world_ref = T_world_ref;
   } catch (...) {
-    if (cloud_.T_world_ref().size() == T_odom_ref_.size()) cloud_.removeNewest();
-    T_odom_ref_.pop_back();
+    if (cloud_.T_world_ref().size() > inserted) cloud_.removeNewest();
+    map_.trajectory.resize(kept);
+    map_.tracker_trajectory.resize(std::min(map_.tracker_trajectory.size(), kept));
+    map_.keyframes.resize(std::min(map_.keyframes.size(), kept_keyframes));
     throw;
   }
   std::swap(quality_, judged);
@@ -406,15 +363,31 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
+  forgetOldest();
   // A motion of a small part of a voxel is not visible.
   constexpr double kVoxelFraction = 0.1;
   if (!refinement_) return;
-  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
   try {
     moveKeyframes(kVoxelFraction * options_.cloud.voxel_size_m);
   } catch (...) {
     refinement_->fail(std::current_exception());
   }
+}
+
+/// Adds a keyframe to the map. If memory runs out, the caller removes what was added.
+void MappingSession::keep(StoredKeyframe keyframe) {
+  const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
+  map_.trajectory.push_back(pose);
+  map_.tracker_trajectory.push_back(pose);
+  map_.keyframes.push_back(std::move(keyframe));
+}
+
+/// In live operation, forgets the points of the oldest keyframes if there are too many.
+void MappingSession::forgetOldest() {
+  const std::size_t most = options_.keptKeyframes();
+  if (map_.keyframes.size() <= most) return;
+  map_.keyframes.erase(map_.keyframes.begin(),
+                       map_.keyframes.end() - static_cast<std::ptrdiff_t>(most));
 }
 
 /// Leaves the keyframes below `end` out of the map whose quality is too low. The quality of a
@@ -431,15 +404,31 @@ void MappingSession::leaveOutBad(std::size_t end) {
 /// keyframes are moved at a time, because the mapping continues.
 void MappingSession::moveKeyframes(double tolerance_m) {
   constexpr std::size_t kMaxMoves = 16;
+  const StageScope scope(&status_.times, &StageSeconds::map, Processors::kThis);
   cloud_.move(refinement_->takeMoved());
   const bool in_background = options_.refinement.background && tolerance_m > 0;
   cloud_.applyPending(tolerance_m, in_background ? kMaxMoves : RefinedCloud::kAll);
 }
 
-void MappingSession::applyPending() {
-  if (!refinement_) return;
-  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
-  moveKeyframes(0);
+std::shared_ptr<MapSnapshot> MappingSession::snapshot(bool with_points) {
+  if (refinement_) moveKeyframes(0);  // so that cloud and keyframes agree
+  const std::vector<Rigid3>& T_world_ref = cloud_.T_world_ref();
+  const std::size_t earlier = map_.trajectory.size() - T_world_ref.size();
+  const std::size_t forgotten = map_.trajectory.size() - map_.keyframes.size();
+  for (std::size_t i = earlier; i < map_.trajectory.size(); ++i) {
+    Rigid3& known = map_.trajectory[i].T_world_rig;
+    if (isSame(known, T_world_ref[i - earlier])) continue;
+    known = T_world_ref[i - earlier];
+    if (i >= forgotten) map_.keyframes[i - forgotten].T_world_ref = known;
+  }
+  for (const std::size_t left_out : left_out_) {
+    if (earlier + left_out < forgotten) continue;
+    map_.keyframes[earlier + left_out - forgotten].points =
+        std::make_shared<const std::vector<ViewPoint>>();
+  }
+  auto map = std::make_shared<MapSnapshot>(map_);
+  if (with_points) map->points = cloud_.cloud().points();
+  return map;
 }
 
 SessionStatus MappingSession::status() const {
@@ -447,14 +436,10 @@ SessionStatus MappingSession::status() const {
   status.held_events = mapper_.heldEvents();
   status.counts = earlier_counts_;
   status.counts += mapper_.counts();
-  if (options_.live.enabled) {
-    LiveStatus& live = status.live.emplace(live_);
-    for (const auto& [camera, events] : status.rejected_events) live.cameras[camera].lost += events;
-    for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
-      const auto camera = static_cast<int>(c);
-      if (!isSelected(camera, options_.mapper.cameras)) continue;
-      live.cameras[camera].lost += status.counts.cameras[c].fates.losses();
-    }
+  LiveStatus& live = status.live.emplace(live_);
+  for (const auto& [camera, events] : status.rejected_events) live.cameras[camera].lost += events;
+  for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
+    live.cameras[static_cast<int>(c)].lost += status.counts.cameras[c].fates.losses();
   }
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/playback_mapper.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
 #include <iterator>
@@ -30,10 +32,17 @@ class PlaybackMapper::FirstError {
   std::exception_ptr first_;
 };
 
+PlaybackMapper::PlaybackMapper(const EventFusionOptions& options, Callbacks callbacks,
+                               const std::vector<StoredKeyframe>& earlier, QualityFacts facts)
+    : MapperDriver(options, std::move(callbacks), earlier, std::move(facts), ChoiceBy::kCaller) {
+  if (options.automatic.any()) look_ = std::make_unique<FirstLook>(options);
+}
+
 // --- Input ---
 
 void PlaybackMapper::useRig(const Rig& rig) {
   const std::lock_guard<TurnMutex> lock(session_mutex_);
+  lookAt(rig);
   feed(rig);
   for (const RigCamera& camera : rig.cameras) {
     intakes_.emplace_back(static_cast<int>(intakes_.size()), camera);
@@ -129,29 +138,61 @@ void PlaybackMapper::stop() {
   stopped_ = true;
 }
 
-void PlaybackMapper::setFacts(QualityFacts facts) {
-  const std::lock_guard<TurnMutex> lock(session_mutex_);
-  session_.setFacts(std::move(facts));
-}
-
 // --- Mapping ---
 
 /// Feeds and maps in the caller's thread.
 void PlaybackMapper::work(std::vector<Input> inputs, bool ends) {
   const auto kept = weak_from_this().lock();  // a callback may drop the last reference
   FirstError error;
-  News news;
   {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
     if (finished_ && !ends) throw std::logic_error("input after the end: `finish` was called");
-    for (Input& input : inputs) error.attempt([&] { feed(std::move(input)); });
+    for (Input& input : inputs) {
+      lookAt(input);
+      error.attempt([&] { feed(std::move(input)); });
+    }
     if (ends && !std::exchange(finished_, true)) error.attempt([&] { session_.finish(); });
-    error.attempt([&] { news = takeNews(); });
   }
-  tell(news, sayer(error));
   while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
   }
   error.rethrow();
+}
+
+/// Shows input to the first look. Input that it rejects is rejected by the session, too.
+void PlaybackMapper::lookAt(const Input& input) {
+  if (!look_) return;
+  if (const auto* const rig = std::get_if<Rig>(&input)) look_->take(*rig);
+  look_ends_ |= std::holds_alternative<Missing>(input);
+  try {
+    if (const auto* const packet = std::get_if<EventPacket>(&input)) look_->addEvents(*packet);
+    if (const auto* const pose = std::get_if<PoseSample>(&input)) look_->addPose(*pose);
+  } catch (const std::invalid_argument&) {
+  }
+}
+
+/// Chooses the automatic options at the end of the input, or if too many events are held.
+void PlaybackMapper::chooseIfDue() {
+  if (!look_) return;
+  const SessionStatus status = session_.status();
+  const double held_mb = static_cast<double>(status.held_events * sizeof(Event)) / 1e6;
+  const bool ends = look_ends_ && status.events &&
+                    secondsBetween(status.events->first_ns, status.events->last_ns) > kFirstWindowS;
+  if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return;
+  RecordingSurvey survey = std::exchange(look_, nullptr)->finish();
+  const double seen_s = survey.duration_s.value_or(0);
+  if (!finished_) survey.duration_s.reset();
+  const EventFusionOptions& options = session_.options();
+  NewOptions found{choose(survey, options, true), !finished_};
+  OptionChoice& choice = found.chosen.choice;
+  if (found.follow_depths) {  // at the end, following limits would be no better
+    if (!choice.found_scene) choice = chooseWideDepths(options.automatic, found.chosen.mapper);
+    for (ChosenOption& option : choice.options) {
+      option.reason += fmt::format(
+          "; from the first {:.3g} s of a stream{}", seen_s,
+          ends ? "" : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
+    }
+  }
+  feed(std::move(found));
 }
 
 /// @return true if it made a keyframe.
@@ -163,7 +204,10 @@ bool PlaybackMapper::mapNext(FirstError& error) {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
     // Within a callback, the caller of the callback maps.
     if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
-    error.attempt([&] { keyframe = mapWindow(); });
+    error.attempt([&] {
+      chooseIfDue();
+      keyframe = mapWindow();
+    });
     if (keyframe) error.attempt([&] { warnings = warningsOfSilence(*keyframe); });
     error.attempt([&] { news = takeNews(); });
   }
@@ -204,23 +248,19 @@ void PlaybackMapper::callBack(FirstError& error, const Call& call) {
 SessionStatus PlaybackMapper::status() const {
   const std::lock_guard<TurnMutex> lock(session_mutex_);
   SessionStatus status = session_.status();
+  status.live.reset();
   status.paused_events = paused_events_;
   return status;
 }
 
 std::shared_ptr<const MapSnapshot> PlaybackMapper::newest(bool with_points) {
   const std::lock_guard<TurnMutex> lock(session_mutex_);
-  return makeSnapshot(with_points);
+  return session_.snapshot(with_points);
 }
 
-FusionMapperOptions PlaybackMapper::usedOptions() const {
+EventFusionOptions PlaybackMapper::usedOptions() const {
   const std::lock_guard<TurnMutex> lock(session_mutex_);
-  return session_.usedOptions();
-}
-
-GlobalCloudOptions PlaybackMapper::cloudOptions() const {
-  const std::lock_guard<TurnMutex> lock(session_mutex_);
-  return session_.cloudOptions();
+  return session_.options();
 }
 
 void PlaybackMapper::describeInput(RecordingCounts& counts) const {

@@ -39,23 +39,29 @@ class TurnMutex {
   std::uint64_t next_ = 0, now_ = 0;
 };
 
-/// Maps in the caller's thread. If a window cannot be mapped (no memory, a sink that throws), the
+/// Maps in the caller's thread.
+///
+/// Automatic options are chosen from the whole recording, with the same code as in
+/// `event-fusion map`, which reads the recording twice. Nothing is mapped before `finish`, and all
+/// events are kept in memory. If they need more than `[live] max_queue_mb`, the recording is a
+/// stream: the options are chosen from the data so far, and then the depth limits follow the
+/// keyframes.
+///
+/// If a window cannot be mapped (no memory, a sink that throws), the
 /// next call tries it again. A query waits while a keyframe is made, but not while it is delivered.
 /// If several threads add samples, keyframes may be delivered at the same time. Within a callback
 /// `add` and `finish` only take the input: the caller of the callback maps it.
 class PlaybackMapper : public MapperDriver {
  public:
   PlaybackMapper(const EventFusionOptions& options, Callbacks callbacks,
-                 const std::vector<StoredKeyframe>& earlier)
-      : MapperDriver(options, std::move(callbacks), earlier) {}
+                 const std::vector<StoredKeyframe>& earlier = {}, QualityFacts facts = {});
 
   void skip(int camera, const std::vector<Event>& events) override;
   void finish() override;
   void stop() override;
-  void setFacts(QualityFacts facts) override;
   SessionStatus status() const override;
   std::shared_ptr<const MapSnapshot> newest(bool with_points) override;
-  GlobalCloudOptions cloudOptions() const override;
+  EventFusionOptions usedOptions() const override;
 
  protected:
   void useRig(const Rig& rig) override;
@@ -63,7 +69,6 @@ class PlaybackMapper : public MapperDriver {
                  std::optional<std::int64_t> complete_until_ns) override;
   void usePacket(EventPacket packet) override;
   void usePose(PoseSample pose) override;
-  FusionMapperOptions usedOptions() const override;
   void describeInput(RecordingCounts& counts) const override;
   bool hasEnded() const override { return ended_; }
 
@@ -72,6 +77,8 @@ class PlaybackMapper : public MapperDriver {
   std::vector<Input> confirmedBy(const EventPacket& packet);
   std::vector<Input> confirmed(std::vector<PoseSample> poses);
   void work(std::vector<Input> inputs, bool ends = false);
+  void lookAt(const Input& input);
+  void chooseIfDue();
   bool mapNext(FirstError& error);
   Say sayer(FirstError& error);
   template <typename Call>
@@ -86,6 +93,8 @@ class PlaybackMapper : public MapperDriver {
   std::atomic<bool> ended_ = false;
   // Guards the session and the members below. It is held while a keyframe is made.
   mutable TurnMutex session_mutex_;
+  std::unique_ptr<FirstLook> look_;  // until the automatic options are chosen
+  bool look_ends_ = false;           // with the next data: events are missing
   std::map<int, std::uint64_t> paused_events_;
   std::set<std::thread::id> delivering_;  // threads that are in a callback
   bool finished_ = false;

@@ -35,6 +35,7 @@ class PoseSourceSelector {
   std::vector<StampedPose> select();
   /// Forgets waiting poses that are older than the last one by more than this.
   void limitWaiting(std::int64_t max_age_ns);
+  void forgetWaiting() { waiting_.clear(); }
   /// Returns the time of the last waiting pose; std::nullopt if none waits.
   std::optional<std::int64_t> waitingNs() const;
 

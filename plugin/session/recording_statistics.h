@@ -56,7 +56,7 @@ double overlapOf(const TimeSpan& events, const TimeSpan& poses);
 /// value, and a blank for 0.
 std::string sparkline(const std::vector<double>& values);
 
-/// Options for the use of a recording. The default: as recorded.
+/// What of a recording is counted. The default: as recorded.
 struct StatisticsOptions {
   std::vector<int> cameras;  ///< The cameras that take part; empty: all.
   std::string pose_source;   ///< Label of the source; empty: the best source.

@@ -2,17 +2,14 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
-#include <ctime>
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mapping/base/option.h"
+#include "mapping/base/stage_times.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/keyframes/mapper_counts.h"
@@ -21,61 +18,6 @@
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {
-
-/// Seconds of a run, by stage: real time or processor time.
-struct StageSeconds {
-  double total = 0;   ///< The whole run.
-  double read = 0;    ///< Reading the recording.
-  double sweep = 0;   ///< Packets, back-projection, votes and fusion.
-  double depth = 0;   ///< Extraction of depth maps.
-  double refine = 0;  ///< Refinement of poses.
-  double map = 0;     ///< Insertion into the global cloud; in real time also its export.
-  double filter = 0;  ///< Checks, buffering and noise filters of events.
-  double images = 0;  ///< Images of keyframes.
-  double start = 0;   ///< Loading of the program and its libraries, before the command.
-  double tables = 0;  ///< Set-up of the rig and the undistortion tables of its cameras.
-  double output = 0;  ///< Export of the map and its files; in processor time only.
-};
-
-/// Real and processor time of the same stages.
-struct StageTimes {
-  StageSeconds real;
-  StageSeconds cpu;
-};
-
-/// Function that returns a processor time, in seconds.
-using ProcessorClock = std::function<double()>;
-
-inline double secondsOf(clockid_t clock) {
-  std::timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-/// Return the processor time of all threads of this process, and of this thread.
-inline double processSeconds() { return secondsOf(CLOCK_PROCESS_CPUTIME_ID); }
-inline double threadSeconds() { return secondsOf(CLOCK_THREAD_CPUTIME_ID); }
-
-/// Adds the time from its construction to its destruction to two sums: real time, and the time of a
-/// processor clock.
-class SecondsScope {
- public:
-  /// @param clock default: the processor time of this thread.
-  SecondsScope(double& real_s, double& cpu_s, ProcessorClock clock = threadSeconds)
-      : real_s_(real_s), cpu_s_(cpu_s), clock_(std::move(clock)), cpu_begin_s_(clock_()) {}
-  ~SecondsScope() {
-    real_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    cpu_s_ += clock_() - cpu_begin_s_;
-  }
-  SecondsScope(const SecondsScope&) = delete;
-  SecondsScope& operator=(const SecondsScope&) = delete;
-
- private:
-  double& real_s_;
-  double& cpu_s_;
-  ProcessorClock clock_;
-  double cpu_begin_s_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 /// Returns a time for the user, exact, and its distance from the recording's start, rounded to
 /// milliseconds: "1468939802.345678901 s (+3.2 s)".
@@ -120,7 +62,7 @@ struct QueueCounts {
   std::uint64_t losses() const { return fates.losses() + lost; }
 };
 
-/// Returns "3 windows given up: 2 for overload, 1 without poses".
+/// Returns "3 windows dropped: 2 for overload, 1 without poses".
 std::string asText(const DroppedWindows& windows);
 
 struct LiveStatus {

@@ -55,8 +55,7 @@ void addUnusedEvents(const SessionStatus& status, const FusionMapperOptions& opt
   }
   if (status.counts.keyframes == 0) return;  // the error says why
   const EventCounts counts = status.counts.total();
-  const std::uint64_t wanted =
-      counts.read - counts[EventFate::kDropped];  // events of unselected cameras
+  const std::uint64_t wanted = counts.read - counts[EventFate::kUnselected];
   if (counts[EventFate::kWithoutPose] > wanted / 2) {
     addWarning(warnings, "events-without-pose",
                "{} of {} events have no pose: poses begin late, end early or have gaps "
@@ -87,8 +86,8 @@ void addSilence(const SessionStatus& status, bool exclude_silent, Warnings& warn
   }
   if (status.counts.silent_subintervals > 0) {
     addWarning(warnings, "silent-subintervals",
-               "{} sub-intervals of a camera had no event: rules that ask all of them (min, "
-               "harmonic, geometric) find nothing where one is empty ([fusion] subintervals)",
+               "{} sub-intervals of a camera had no event: with min, harmonic and geometric fusion "
+               "such a window has no depth there: lower [fusion] subintervals",
                status.counts.silent_subintervals);
   }
 }
@@ -192,7 +191,7 @@ OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions&
   }
   const EventCounts counts = status.counts.total();
   if (counts[EventFate::kFiltered] > 0 && counts[EventFate::kUsed] == 0 &&
-      counts[EventFate::kFiltered] + counts[EventFate::kDropped] == counts.read) {
+      counts[EventFate::kFiltered] + counts[EventFate::kUnselected] == counts.read) {
     return fmt::format(
         "the filters took all {} events of the selected cameras for noise: [filter] is too strict "
         "for this recording",
@@ -200,7 +199,7 @@ OptionHint whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions&
   }
   if (counts[EventFate::kOutsideLens] > 0 && counts[EventFate::kUsed] == 0 &&
       counts[EventFate::kOutsideLens] + counts[EventFate::kFiltered] +
-              counts[EventFate::kDropped] ==
+              counts[EventFate::kUnselected] ==
           counts.read) {
     return fmt::format(
         "{} of {} events lie outside the lens: its model has no viewing ray for their pixels, so "

@@ -15,7 +15,6 @@
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/benches.h"
-#include "test/bench/stage_clock.h"
 #include "test/bench/unfused_keyframe.h"
 
 namespace efm::bench {
@@ -100,13 +99,13 @@ void addStages(const std::string& name, const LazyWindow& window, const Prepare&
     const SyntheticWindow& made = window();
     if (!peak_mb) peak_mb = peakMemory_mb([&] { prepare(made)(nullptr); });
     auto map = prepare(made);
-    StageClock stages;
-    for (auto _ : state) map(&stages);
+    StageTimes times;
+    for (auto _ : state) map(&times);
     countVotes(state, made, kPlanes);
     constexpr auto kMean = benchmark::Counter::kAvgIterations;
-    state.counters["warp_ms"] = benchmark::Counter(stages.warp_ms, kMean);
-    state.counters["sweep_ms"] = benchmark::Counter(stages.sweep_ms, kMean);
-    state.counters["depth_ms"] = benchmark::Counter(stages.depth_ms, kMean);
+    state.counters["warp_ms"] = benchmark::Counter(1e3 * times.cpu.rays, kMean);
+    state.counters["sweep_ms"] = benchmark::Counter(1e3 * times.cpu.sweep, kMean);
+    state.counters["depth_ms"] = benchmark::Counter(1e3 * times.cpu.depth, kMean);
     state.counters["peak_mb"] = *peak_mb;
   });
 }
@@ -118,8 +117,8 @@ void addStereo(const SensorSize& sensor, bool smallest) {
   const std::string name = "keyframe/" + sensor.name() + "/";
   addStages(name + "unfused/threads:1", window, [](const SyntheticWindow& made) {
     return [&made, events = spansOf(made),
-            keyframe = UnfusedKeyframe(made.rig, made.options)](StageHook* stages) mutable {
-      benchmark::DoNotOptimize(keyframe.map(made.window, events, made.trajectory, stages));
+            keyframe = UnfusedKeyframe(made.rig, made.options)](StageTimes* times) mutable {
+      benchmark::DoNotOptimize(keyframe.map(made.window, events, made.trajectory, times));
     };
   });
   for (const VotingKernel kernel : availableKernels()) {
@@ -132,9 +131,9 @@ void addStereo(const SensorSize& sensor, bool smallest) {
       addStages(name + std::string(nameOf(kernel)) + "/threads:" + std::to_string(threads), window,
                 [=](const SyntheticWindow& made) {
                   return [&made, events = spansOf(made),
-                          mapper = what.mapper(made)](StageHook* stages) mutable {
+                          mapper = what.mapper(made)](StageTimes* times) mutable {
                     benchmark::DoNotOptimize(
-                        mapper.map(made.window, events, made.trajectory, nullptr, stages));
+                        mapper.map(made.window, events, made.trajectory, nullptr, times));
                   };
                 });
     }

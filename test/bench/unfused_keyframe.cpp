@@ -22,12 +22,7 @@ UnfusedKeyframe::UnfusedKeyframe(const Rig& rig, const KeyframeMapperOptions& op
 
 std::optional<DepthMap> UnfusedKeyframe::map(const Window& window,
                                              const std::vector<EventSpan>& events,
-                                             const Trajectory& trajectory, StageHook* stages) {
-  const auto stage = [&](Stage which, const auto& work) {
-    if (stages != nullptr) stages->begin(which);
-    work();
-    if (stages != nullptr) stages->end(which);
-  };
+                                             const Trajectory& trajectory, StageTimes* times) {
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
   const Rigid3 T_world_ref = *T_world_rig * rig_.cameras.front().T_rig_cam;
@@ -35,22 +30,23 @@ std::optional<DepthMap> UnfusedKeyframe::map(const Window& window,
                                 planes_.depth(planes_.size() - 1)};
 
   std::vector<RayBundle> rays;
-  stage(Stage::kSweep, [&] {
+  {
+    const StageScope scope(times, &StageSeconds::rays);
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       const PosePackets packets = splitIntoPosePackets(events[c], rig_.cameras[c], undistortion_[c],
                                                        trajectory, geometry, options_.packets);
       rays.push_back(backProject(events[c], packets, undistortion_[c], view_));
     }
-  });
+  }
   DsiPeaks peaks;
-  stage(Stage::kSweep, [&] {
+  {
+    const StageScope scope(times, &StageSeconds::sweep);
     for (std::size_t c = 0; c < rays.size(); ++c) vote(rays[c], volumes_[c]);
     fuse();
     peaks = findPeaks();
-  });
-  DepthMap map;
-  stage(Stage::kDepth, [&] { map = extractAsPaper(peaks, planes_, options_.extraction); });
-  return map;
+  }
+  const StageScope scope(times, &StageSeconds::depth);
+  return extractAsPaper(peaks, planes_, options_.extraction);
 }
 
 void UnfusedKeyframe::vote(const RayBundle& rays, Volume& volume) const {

@@ -29,7 +29,7 @@ class UnfusedKeyframe {
 
   /// @return std::nullopt if the reference time has no pose.
   std::optional<DepthMap> map(const Window& window, const std::vector<EventSpan>& events,
-                              const Trajectory& trajectory, StageHook* stages = nullptr);
+                              const Trajectory& trajectory, StageTimes* times = nullptr);
 
  private:
   using Volume = std::vector<float>;  // [z][y][x]

@@ -138,7 +138,7 @@ const char* ownResult(const fs::path& source) {
   if (isFile(source / "report.json") && isReport(source / "report.json")) {
     return "the result of an earlier run";
   }
-  if (isFile(source / "report.partial.json")) {
+  if (isFile(source / "run.lock")) {
     return "the result of a run that was killed, or is not at its end yet";
   }
   if (!isFile(source)) return nullptr;

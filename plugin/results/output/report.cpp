@@ -64,20 +64,23 @@ Json asJson(const EventCounts& counts) {
 }
 
 Json asJson(const StageSeconds& seconds) {
-  return {{"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.sweep},
-          {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
+  return {
+      {"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.rays + seconds.sweep},
+      {"depth", seconds.depth}, {"motion", seconds.motion}, {"refine", seconds.refine},
+      {"map", seconds.map}};
 }
 
 /// Returns processor time: the fixed cost of a run, and costs that grow with events and keyframes.
 Json byGrowth(const StageSeconds& cpu) {
-  const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.sweep +
-                          cpu.depth + cpu.refine + cpu.map + cpu.images;
+  const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.rays +
+                          cpu.sweep + cpu.depth + cpu.motion + cpu.refine + cpu.map + cpu.images;
   return {{"total", cpu.total},
           {"once", {{"start", cpu.start}, {"tables", cpu.tables}, {"output", cpu.output}}},
           {"events", {{"read", cpu.read}, {"filter", cpu.filter}}},
           {"keyframes",
-           {{"sweep", cpu.sweep},
+           {{"sweep", cpu.rays + cpu.sweep},
             {"depth", cpu.depth},
+            {"motion", cpu.motion},
             {"refine", cpu.refine},
             {"map", cpu.map},
             {"images", cpu.images}}},
@@ -151,12 +154,12 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
   }
   return {{"drop_ratio", live.dropRatio()},
           {"cameras", cameras},
-          {"windows_given_up", counts.dropped_windows.total()},
-          {"windows_given_up_for", asJson(counts.dropped_windows)},
+          {"windows_dropped", counts.dropped_windows.total()},
+          {"windows_dropped_for", asJson(counts.dropped_windows)},
           {"late_events", live.late_events},
           {"pose_jumps", live.pose_jumps},
-          {"clock_steps", live.clock_resets},
-          {"refused_poses", live.rejected_poses},
+          {"clock_resets", live.clock_resets},
+          {"rejected_poses", live.rejected_poses},
           {"errors", live.errors},
           {"last_error", live.last_error}};
 }
@@ -225,6 +228,7 @@ std::string reportJson(const MapReport& report) {
   for (const EventCounts& camera : counts.cameras) events["cameras"].push_back(asJson(camera));
 
   Json json;
+  json["schema"] = 1;  // grows when a key changes its name or its meaning
   json["version"] = EFM_VERSION;
   if (!report.recording.empty()) json["recording"] = report.recording;
   json["events"] = events;
@@ -252,7 +256,7 @@ std::string reportJson(const MapReport& report) {
   json["recording_seconds"] = report.recording_s;
   json["seconds"] = asJson(report.times.real);
   json["cpu_seconds"] = byGrowth(report.times.cpu);
-  const double sweep_s = report.times.real.sweep;
+  const double sweep_s = report.times.real.rays + report.times.real.sweep;
   json["votes_per_second"] =
       sweep_s > 0 ? static_cast<double>(counts.votes.total()) / sweep_s : 0.0;
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
@@ -326,7 +330,8 @@ std::string eventsText(const EventCounts& counts) {
   const char* before = "; ";
   for (const EventFate fate :
        {EventFate::kOutsideWindow, EventFate::kWithoutPose, EventFate::kFiltered,
-        EventFate::kOverBudget, EventFate::kDropped, EventFate::kOutsideLens}) {
+        EventFate::kOverBudget, EventFate::kLate, EventFate::kDropped, EventFate::kUnselected,
+        EventFate::kOutsideLens}) {
     if (counts[fate] == 0) continue;
     text += before + shareText(counts[fate], counts.read) + " " + rowOf(fate).text;
     before = ", ";

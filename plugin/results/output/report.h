@@ -15,7 +15,7 @@
 #include "mapping/keyframes/fusion_mapper.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/options/option_file.h"
-#include "plugin/results/output/map_output.h"
+#include "plugin/results/output/result_folder.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/session_status.h"
@@ -76,32 +76,32 @@ struct MapReport {
   std::optional<double> stopped_at;
   std::uint64_t skipped_events = 0;  ///< Bad events that the reader left out.
   std::vector<Warning> warnings;
-  std::vector<Warning> notes;       ///< What could not be checked.
+  std::vector<Warning> notes;  ///< What could not be checked.
   MapQuality quality;
 };
 
 /// Writes the number of points and their extents into the report.
 void describePoints(const MapCloud& cloud, MapReport& report);
 
-/// Returns the report as indented JSON: events (total and per camera; read = used + without_pose +
-/// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (the sum of
-/// votes is event_uses x planes), keyframes, silent (keyframes per camera, sub-intervals), points,
-/// extent_m (min and max, frame `world`; absent without points), pixels (see PixelCounts),
-/// most_extent_m (the extent of 0.1 to 99.9 % of the points on each axis), recording_seconds (first
-/// event to last event), seconds (real time), cpu_seconds (processor time: once per run, for
-/// events, for keyframes), votes_per_second, sorted_events, skipped_events (bad events that the
-/// reader left out), refinement if poses were refined (registered keyframes; loops; failed_solves;
-/// failures: errors, after which a keyframe keeps the tracker's motion; last_error; the learnt
-/// errors of the tracker; moved: the shift of the poses), kernel, threads, peak_memory_bytes (of
-/// this process), reference_view and baseline_m if known, stopped_at if the run was interrupted
-/// (the fraction of the recording that was mapped), live in live operation (drop_ratio; counts of
-/// each camera's events before the mapping; windows_given_up and the reasons; late_events,
-/// pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each with name and
-/// text), notes (the same; absent if there are none), quality (see MapQuality: word, wrong_share,
-/// depth_error, support, agreement and sharpness if known, left_out, reasons, keyframes,
-/// much_worse), recording (the files), perturbation (the faults of the poses, if any), chosen (the
-/// automatic options: key, value and reason), options (all options with the used values) and
-/// version. Bytes of names that are not UTF-8 become U+FFFD.
+/// Returns the report as indented JSON: schema (1), events (total and per camera; read = used +
+/// without_pose + outside_window + late + dropped + unselected + filtered + outside_lens +
+/// over_budget), event_uses, votes (the sum of votes is event_uses x planes), keyframes, silent
+/// (keyframes per camera, sub-intervals), points, extent_m (min and max, frame `world`; absent
+/// without points), pixels (see PixelCounts), most_extent_m (the extent of 0.1 to 99.9 % of the
+/// points on each axis), recording_seconds (first event to last event), seconds (real time),
+/// cpu_seconds (processor time: once per run, for events, for keyframes), votes_per_second,
+/// sorted_events, skipped_events (bad events that the reader left out), refinement if poses were
+/// refined (registered keyframes; loops; failed_solves; failures: errors, after which a keyframe
+/// keeps the tracker's motion; last_error; the learnt errors of the tracker; moved: the shift of
+/// the poses), kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m
+/// if known, stopped_at if the run was interrupted (the fraction of the recording that was mapped),
+/// live in live operation (drop_ratio; counts of each camera's events before the mapping;
+/// windows_dropped and the reasons; late_events, pose_jumps, clock_resets, rejected_poses, errors
+/// and last_error), warnings (each with name and text), notes (the same; absent if there are none),
+/// quality (see MapQuality: word, wrong_share, depth_error, support, agreement and sharpness if
+/// known, left_out, reasons, keyframes, much_worse), recording (the files), perturbation (the
+/// faults of the poses, if any), chosen (the automatic options: key, value and reason), options
+/// (all options with the used values) and version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// Return lists of objects with the keys of the report: key, value and reason; name and text.

@@ -242,109 +242,21 @@ TEST(KeyframeMapper, WhatIsNotValidIsNamed) {
   EXPECT_NO_THROW(KeyframeMapper(broken, {0, 2}, fewPlanes()));
 }
 
-}  // namespace
-
-// Selection among the keyframes along corrected motions. `MotionCorrection` tests the correction.
-
-namespace {
-
-struct NoSink : DsiSink {
-  void addPlane(int, const float*) override {}
-};
-
-TEST(CorrectedKeyframe, IsTheSharpestOfThoseThatGainEnough) {
-  const struct {
-    const char* what;
-    std::vector<double> sharpness;  // per whole keyframe; the first has the tracked motion
-    int rounds;
-    double min_gain;
-    bool with_sink;
-    int taken;    // index of the selected keyframe
-    int aligned;  // times
-    double shift_px = 1;
-  } cases[] = {
-      {"too little", {1, 1.09, 5}, 3, 0.1, false, 0, 1},
-      {"enough, then less", {1, 1.11, 1.1, 5}, 3, 0.1, false, 1, 2},
-      {"after the first any gain is enough", {1, 1.11, 1.12, 1.13, 5}, 3, 0.1, false, 3, 3},
-      {"rounds", {1, 2, 3, 4}, 2, 0.1, false, 2, 2},
-      {"nothing is sharp", {0, 0, 5}, 3, 0, false, 0, 1},
-      {"the same motion", {1, 5}, 3, 0, false, 0, 1, 0.1},
-      {"the sink has the one that is taken", {1, 2, 1.5, 2}, 3, 0.1, true, 1, 2},
-      {"the sink has the tracked one", {2, 1, 2}, 3, 0.1, true, 0, 1},
-  };
-  const test::RandomRecording recording(1, 1, 10);
-  const ReferenceView view = ReferenceView::of(test::smallCamera());
-  const DepthPlanes planes;
-  const std::vector<CameraEvents> no_cameras;
-  const Window& window = test::RandomRecording::kWindow;
-  const cv::Mat1f central_depth(1, 1, 0.5F);
-  for (const auto& c : cases) {
-    SCOPED_TRACE(c.what);
-    MotionCorrectionOptions options;
-    options.motion_rounds = c.rounds;
-    options.min_gain = c.min_gain;
-    NoSink sink;
-    std::vector<const DsiSink*> sinks;
-    std::vector<std::size_t> poses;  // a corrected motion has poses at its knots
-    std::vector<float> aligned_to;   // depths
-    const auto map_along = [&](const WindowInput& input, const Trajectory& motion, DsiSink* to) {
-      KeyframeDepthMap keyframe;
-      EXPECT_EQ(input.window.t1_ns, window.t1_ns);
-      keyframe.map.depth = cv::Mat1f(1, 1, static_cast<float>(sinks.size() + 1));
-      const double value = std::sqrt(c.sharpness.at(sinks.size()));
-      keyframe.map.confidence = cv::Mat1f(1, 1, static_cast<float>(value));
-      keyframe.without_pose = sinks.size();
-      sinks.push_back(to);
-      poses.push_back(motion.poses().size());
-      return keyframe;
-    };
-    const auto align = [&](const cv::Mat1f& depth, const std::optional<MotionCorrection>& start) {
-      EXPECT_EQ(start.has_value(), !aligned_to.empty());
-      aligned_to.push_back(depth(0, 0));
-      return AlignedMotion{knotsOf(window, 0.003), c.shift_px};
-    };
-    const KeyframeDepthMap keyframe = mapCorrected({{window, no_cameras, view, planes, {}},
-                                                    recording.trajectory,
-                                                    options,
-                                                    central_depth,
-                                                    c.with_sink ? &sink : nullptr},
-                                                   map_along, align);
-    ASSERT_EQ(aligned_to.size(), static_cast<std::size_t>(c.aligned));
-    EXPECT_EQ(aligned_to.front(), 0.5F) << "the depth of the central part";
-    for (std::size_t i = 1; i < aligned_to.size(); ++i) {
-      EXPECT_EQ(aligned_to[i], static_cast<float>(i + 1)) << "the depth of the round before";
-    }
-    for (std::size_t i = 0; i < sinks.size(); ++i) {
-      const bool last = c.with_sink && i + 1 == sinks.size();
-      EXPECT_EQ(sinks[i], last ? &sink : nullptr);
-      const bool tracked = i == 0 || (last && c.taken == 0);
-      EXPECT_EQ(poses[i] == recording.trajectory.poses().size(), tracked) << i;
-    }
-    EXPECT_EQ(keyframe.without_pose,
-              static_cast<std::uint64_t>(c.with_sink ? sinks.size() - 1 : c.taken));
-    EXPECT_EQ(keyframe.motion_correction.has_value(), c.taken > 0);
-  }
-}
-
-/// Records the begins and ends of stages.
-struct StageLog : StageHook {
-  std::string stages;
-  void begin(Stage stage) override { stages += "fsd"[static_cast<int>(stage)]; }
-  void end(Stage stage) override { stages += "FSD"[static_cast<int>(stage)]; }
-};
-
-TEST(Stages, OfAKeyframeAreTheRaysTheSweepAndTheDepth) {
-  const test::RandomRecording recording(1, 2, 100);
-  KeyframeMapperOptions options;
-  for (const bool correct_motion : {false, true}) {
-    options.motion.correct_motion =
-        correct_motion ? MotionCorrectionUse::kAlways : MotionCorrectionUse::kNever;
+TEST(StageTimes, AKeyframeHasRaysSweepAndDepthAndMotionIfItIsCorrected) {
+  const Recording recording(1, 2, 1000);
+  KeyframeMapperOptions options = fewPlanes();
+  for (const auto use : {MotionCorrectionUse::kNever, MotionCorrectionUse::kAlways}) {
+    options.motion.correct_motion = use;
     KeyframeMapper mapper(recording.rig, {0, 1}, options);
-    StageLog log;
-    mapper.map(test::RandomRecording::kWindow, recording.spans(), recording.trajectory, nullptr,
-               &log);
-    // The central part, the whole window, the alignment, which counts as a part of the sweep.
-    EXPECT_THAT(log.stages, ::testing::StartsWith(correct_motion ? "sSsSdDsSsSdDsS" : "sSsSdD"));
+    StageTimes times;
+    mapper.map(Recording::kWindow, recording.spans(), recording.trajectory, nullptr, &times);
+    for (const StageSeconds* const seconds : {&times.real, &times.cpu}) {
+      EXPECT_GT(seconds->rays, 0);
+      EXPECT_GT(seconds->sweep, 0);
+      EXPECT_GT(seconds->depth, 0);
+      EXPECT_EQ(seconds->motion > 0, use == MotionCorrectionUse::kAlways);
+      EXPECT_EQ(seconds->filter, 0);
+    }
   }
 }
 

@@ -155,7 +155,7 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
           const bool has_pose = trajectory.poseAt(t_ns).has_value();
           ++expected.read;
           if (c == 2) {
-            ++expected[EventFate::kDropped];
+            ++expected[EventFate::kUnselected];
           } else if (!options.limits.contain(t_ns)) {
             ++expected[EventFate::kOutsideWindow];
           } else if (!has_pose) {

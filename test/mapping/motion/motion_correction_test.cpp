@@ -343,6 +343,25 @@ TEST(MotionCorrection, ABlurredKeyframeIsMappedAlongTheCorrectedMotionAndBecomes
   }
 }
 
+TEST(MotionCorrection, FurtherRoundsMakeItSharperAndTheFirstMustGainEnough) {
+  const MovingEdges recording = blurred(2);
+  KeyframeMapperOptions some = options(true);
+  double gain = 1;
+  for (const int rounds : {1, 2, 3}) {
+    some.motion.motion_rounds = rounds;
+    const KeyframeDepthMap found = map(recording, recording.cameras(), some);
+    EXPECT_GE(found.sharpness_gain, gain) << rounds;
+    gain = found.sharpness_gain;
+  }
+  for (const double asked : {0.5 * (gain - 1), 2 * (gain - 1)}) {
+    some.motion.motion_rounds = 1;
+    some.motion.min_gain = asked;
+    const KeyframeDepthMap found = map(recording, recording.cameras(), some);
+    EXPECT_EQ(found.motion_correction.has_value(), asked < gain - 1);
+    EXPECT_EQ(found.sharpness_gain > 1, found.motion_correction.has_value());
+  }
+}
+
 /// With `auto`, blurred keyframes are those of a correction, and sharp ones those without. A single
 /// camera is looked at, but never corrected.
 TEST(MotionCorrection, ByAutoIsForBlurredKeyframesOfSeveralCameras) {

@@ -27,14 +27,14 @@ CObservationEvents packetOf(const SyntheticRecording& recording, int camera, dou
 /// A mapper that is fed with packets.
 struct Host {
   explicit Host(const EventFusionOptions& options)
-      : mapper(std::make_shared<Mapper>(options)), packets(options, mapper) {}
+      : mapper(MapperDriver::make(options, {})), packets(options, mapper) {}
 
   void addPoses(const SyntheticRecording& recording) {
-    for (const StampedPose& pose : recording.poses) mapper->addPose(pose);
+    for (const StampedPose& pose : recording.poses) mapper->add(sampleOf(pose));
   }
-  std::size_t keyframes() const { return mapper->driver().newest(false)->keyframes.size(); }
+  std::size_t keyframes() const { return mapper->newest(false)->keyframes.size(); }
 
-  std::shared_ptr<Mapper> mapper;
+  std::shared_ptr<MapperDriver> mapper;
   RigFromPackets packets;
 };
 

@@ -451,7 +451,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
                          const std::function<void(FusionMapperOptions&)>& change = {}) {
     return [=](SessionStatus& status, FusionMapperOptions& options) {
       status.counts.cameras[0][kind] = events;
-      status.counts.cameras[1][EventFate::kDropped] = drop;
+      status.counts.cameras[1][EventFate::kUnselected] = drop;
       if (change) change(options);
     };
   };

@@ -178,6 +178,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
     addPoses(session, recording);
     session.add(sampleOf(at(newest_s + 2)));
     EXPECT_FALSE(session.next());
+    session.limitWaits();
     addEvents(session, recording);
     EXPECT_EQ(mapRest(session).size(), newest_s > 600 ? 0U : 11U);
     const EventCounts counts = session.status().counts.total();
@@ -188,6 +189,7 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   for (std::int64_t ago_s = 7200; ago_s > 0; --ago_s) {
     session.add(sampleOf(at(ago_s == 5000 ? 4980 : -ago_s), wheels));
     EXPECT_FALSE(session.next());
+    session.limitWaits();
   }
   for (const StampedPose& pose : recording.poses) session.add(sampleOf(pose, wheels));
   addEvents(session, recording);

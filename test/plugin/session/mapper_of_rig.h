@@ -31,6 +31,7 @@ struct MapperOfRig : Mapper {
       : Mapper(options, std::move(callbacks), earlier) {
     addCameras({SyntheticRecording(0.001).cameras});
   }
+  MapperDriver& driver() { return *driver_; }
 };
 
 /// Returns packets of 10 ms of each camera, then the pose at their end.
@@ -110,21 +111,6 @@ inline std::set<std::int64_t> timesOf(const MapSnapshot& map) {
   std::set<std::int64_t> times;
   for (const StampedPose& pose : map.trajectory) times.insert(pose.t_ns);
   return times;
-}
-
-/// Expects the same poses of all keyframes and the same points, bit for bit.
-inline void expectSameMap(const MapSnapshot& map, const MapSnapshot& expected) {
-  for (const auto trajectory : {&MapSnapshot::trajectory, &MapSnapshot::tracker_trajectory}) {
-    const std::vector<StampedPose>& poses = map.*trajectory;
-    ASSERT_EQ(poses.size(), (expected.*trajectory).size());
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      const StampedPose& other = (expected.*trajectory)[i];
-      EXPECT_EQ(poses[i].t_ns, other.t_ns);
-      EXPECT_TRUE(isSame(poses[i].T_world_rig, other.T_world_rig)) << "keyframe " << i;
-    }
-  }
-  EXPECT_EQ(map.points->size(), expected.points->size());
-  EXPECT_TRUE(test::sameBits(*map.points, *expected.points));
 }
 
 /// The lines of a mapper's log.

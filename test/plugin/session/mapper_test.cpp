@@ -342,7 +342,7 @@ TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
 }
 
 TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
-  std::shared_ptr<Mapper> mapper;
+  std::shared_ptr<MapperOfRig> mapper;
   std::atomic<int> calls{0};
   Mapper::Callbacks callbacks;
   callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
@@ -365,7 +365,7 @@ TEST(Mapper, InPlaybackAHostMayDropItsLastReferenceInAKeyframesCallback) {
   for (const bool in_finish : {false, true}) {
     EventFusionOptions options = syntheticOptions();
     if (in_finish) options.automatic = defaultOptions().automatic;  // nothing is mapped before
-    std::shared_ptr<Mapper> mapper;
+    std::shared_ptr<MapperOfRig> mapper;
     int calls = 0;
     Mapper::Callbacks callbacks;
     callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
@@ -406,7 +406,7 @@ TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
   const EventFusionOptions options = in(syntheticOptions());
   const auto expected = mapOf(options, samples);
   for (const bool log_throws : {false, true}) {
-    std::shared_ptr<Mapper> mapper;
+    std::shared_ptr<MapperOfRig> mapper;
     MapperLog log;
     std::size_t thrown = 0;
     std::size_t keyframes = 0;

@@ -28,9 +28,9 @@ void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
 }
 
 /// Returns the median distance of the points from the dots' plane: steps of 30 planes, 1 to 5 m.
-double medianErrorInSteps(const MappingSession& session) {
+double medianErrorInSteps(MappingSession& session) {
   std::vector<DepthPair> pairs;
-  const MapCloud::ConstPtr points = session.cloud().points();
+  const MapCloud::ConstPtr points = pointsOf(session);
   for (const MapPoint& point : *points) {
     pairs.push_back({positionIn(*points, point).z(), SyntheticRecording::kDepthM});
   }
@@ -47,7 +47,7 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
     options.live.enabled = live;
     SessionOfRig session(options);
     EXPECT_EQ(mapAll(session, recording).size(), live ? 3U : 4U);
-    ASSERT_GT(session.cloud().points()->size(), 30U);
+    ASSERT_GT(pointsOf(session)->size(), 30U);
     // In a window, dots have 8 px of parallax and are rounded to pixels. An error of half a pixel
     // is 0.5 / 8 of 1 / (2 m), a little more than one plane step.
     EXPECT_LT(medianErrorInSteps(session), 1.5);
@@ -113,13 +113,13 @@ TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
     options.automatic = {};
     SessionOfRig expected(options);
     mapAll(expected, recording);
-    SessionOfRig session(automaticOptions());
+    PlaybackSession session(automaticOptions());
 
     EXPECT_THAT(mapUnfinished(session, recording, 10), IsEmpty()) << "more may come";
     EXPECT_THAT(mapRest(session), Not(IsEmpty()));
 
-    expectSameMap(session, expected);
-    const SessionStatus status = session.status();
+    expectSameMap(*session.mapper->newest(true), *expected.snapshot(true));
+    const SessionStatus status = session.mapper->status();
     ASSERT_EQ(status.chosen.size(), 5U);
     for (std::size_t i = 0; i < 5; ++i) {
       EXPECT_EQ(status.chosen[i].key, choice.options[i].key);
@@ -137,13 +137,28 @@ TEST(MappingSession, AnAutomaticVoxelIsAPixelAtTheMedianDepthAndIsChosenOnce) {
       EventFusionOptions options = automaticOptions();
       options.automatic.voxel_size_m = true;
       options.live.enabled = live;
-      SessionOfRig session(options);
-      if (has_earlier) session.insertEarlier({{{0, 0, 1}, 1.0F}}, {});
-      EXPECT_THAT(mapAll(session, recording), Not(IsEmpty()));
-      const double voxel_m = session.cloudOptions().voxel_size_m;
-      EXPECT_EQ(session.cloud().options().voxel_size_m, voxel_m);
+      std::vector<StoredKeyframe> earlier;
+      if (has_earlier) {
+        earlier.push_back(
+            {0,
+             {},
+             std::make_shared<const std::vector<ViewPoint>>(1, ViewPoint{{0, 0, 1}, 1, 1, 1})});
+      }
+      SessionStatus status;
+      double voxel_m = 0;
+      if (live) {
+        SessionOfRig session(options, 2, earlier);
+        EXPECT_THAT(mapAll(session, recording), Not(IsEmpty()));
+        status = session.status();
+        voxel_m = session.options().cloud.voxel_size_m;
+      } else {
+        PlaybackSession session(options, earlier);
+        EXPECT_THAT(mapAll(session, recording), Not(IsEmpty()));
+        status = session.mapper->status();
+        voxel_m = session.mapper->usedOptions().cloud.voxel_size_m;
+      }
       std::vector<double> chosen_m;
-      for (const ChosenOption& option : session.status().chosen) {
+      for (const ChosenOption& option : status.chosen) {
         if (option.key == "voxel_size_m") chosen_m.push_back(option.value);
       }
       if (has_earlier) {  // its points are merged already
@@ -171,11 +186,12 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
   for (const bool is_full : {true, false}) {
     EventFusionOptions options = automaticOptions();
     if (is_full) options.live.max_queue_mb = kMaxMb;
-    SessionOfRig session(options);
-    if (!is_full) session.add(Missing{0, kMinTimeNs, DropReason::kPaused});
+    PlaybackSession session(options);
+    if (!is_full) session.mapper->skip(0, {{kMinTimeNs, 0, 0, false}});
     EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
-    ASSERT_EQ(session.status().chosen.size(), 5U);
-    for (const ChosenOption& option : session.status().chosen) {
+    const SessionStatus status = session.mapper->status();
+    ASSERT_EQ(status.chosen.size(), 5U);
+    for (const ChosenOption& option : status.chosen) {
       const std::size_t at = option.reason.find("; from the first ");
       ASSERT_NE(at, std::string::npos) << option.reason;
       const double seconds = std::stod(option.reason.substr(at + 17));
@@ -365,7 +381,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
     const std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 50);
 
     ASSERT_FALSE(keyframes.empty()) << rest_s;
-    const DepthPlanesOptions& planes = session.newestPlanes();
+    const DepthPlanesOptions& planes = keyframes.back().planes;
     const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // 1/m, in a window of 1 s
     const double step = std::max(
         pixel, (1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1));

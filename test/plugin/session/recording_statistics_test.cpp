@@ -187,7 +187,7 @@ TEST(WhyNoKeyframe, SaysWhatTookAllEvents) {
       EventCounts& counts = status.counts.cameras[1];
       counts[EventFate::kFiltered] = filtered;
       counts[EventFate::kOutsideLens] = outside_lens;
-      counts[EventFate::kDropped] = dropped;
+      counts[EventFate::kUnselected] = dropped;
       counts[EventFate::kUsed] = used;
     });
   };

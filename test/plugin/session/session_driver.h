@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "plugin/session/gate.h"
+#include "plugin/session/mapper_driver.h"
 #include "plugin/session/mapping_session.h"
 #include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/synthetic_recording.h"
@@ -19,17 +20,48 @@ namespace efm {
 
 /// A session of the synthetic rig, with the options' time offsets.
 struct SessionOfRig : MappingSession {
-  explicit SessionOfRig(const EventFusionOptions& options, int num_cameras = 2)
-      : MappingSession(options) {
+  explicit SessionOfRig(const EventFusionOptions& options, int num_cameras = 2,
+                        const std::vector<StoredKeyframe>& earlier = {})
+      : MappingSession(options, earlier) {
     add(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
                    options.rig.time_offsets_ns));
   }
 };
 
+/// The poses of a session's keyframes: in the map, and by the tracker.
+inline std::vector<StampedPose> posesOf(MappingSession& session) {
+  return session.snapshot(false)->trajectory;
+}
+inline std::vector<StampedPose> trackerPosesOf(MappingSession& session) {
+  return session.snapshot(false)->tracker_trajectory;
+}
+inline MapCloud::ConstPtr pointsOf(MappingSession& session) {
+  return session.snapshot(true)->points;
+}
+
+/// A mapper in playback, whose keyframes are taken like those of a session.
+struct PlaybackSession {
+  explicit PlaybackSession(const EventFusionOptions& options,
+                           const std::vector<StoredKeyframe>& earlier = {})
+      : mapper(MapperDriver::make(options, callbacks(), earlier)) {
+    mapper->addCameras({SyntheticRecording(0.001).cameras});
+  }
+  Mapper::Callbacks callbacks() {
+    Mapper::Callbacks callbacks;
+    callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) { made.push_back(keyframe); };
+    return callbacks;
+  }
+  void add(Sample sample) { mapper->add(std::move(sample)); }
+  void finish() { mapper->finish(); }
+
+  std::vector<KeyframeDepthMap> made;
+  std::shared_ptr<MapperDriver> mapper;
+};
+
 /// A session behind a gate, as in live operation, in one thread.
 struct LiveSession : MappingSession {
   explicit LiveSession(const EventFusionOptions& options, int num_cameras = 2)
-      : MappingSession(options), gate(options.live) {
+      : MappingSession(options), gate(options.live), most_(options.live.queueEvents()) {
     gate.add(calibrated({SyntheticRecording(0.001, num_cameras).cameras}, {},
                         options.rig.time_offsets_ns));
   }
@@ -57,13 +89,18 @@ struct LiveSession : MappingSession {
     map();
   }
   void map() {
+    limitHeld(most_);
     while (auto keyframe = next()) made.push_back(std::move(*keyframe));
+    limitWaits();
   }
 
   Gate gate;
   bool takes = true;  ///< False: a machine that is busy.
   std::uint64_t rejected = 0;
   std::vector<KeyframeDepthMap> made;
+
+ private:
+  double most_;
 };
 
 /// Returns all events of a camera in one packet.
@@ -117,6 +154,9 @@ inline std::vector<KeyframeDepthMap> mapDue(MappingSession& session) {
 inline std::vector<KeyframeDepthMap> mapDue(LiveSession& session) {
   return std::exchange(session.made, {});
 }
+inline std::vector<KeyframeDepthMap> mapDue(PlaybackSession& session) {
+  return std::exchange(session.made, {});
+}
 
 template <typename Session>
 std::vector<KeyframeDepthMap> mapRest(Session& session) {
@@ -166,15 +206,23 @@ void mapPiecewise(Session& session, const SyntheticRecording& recording, int pac
   mapRest(session);
 }
 
-/// Expects the same keyframes at the same poses and the same points, bit for bit.
-inline void expectSameMap(const MappingSession& session, const MappingSession& expected) {
-  ASSERT_EQ(session.T_world_ref().size(), expected.T_world_ref().size());
-  for (std::size_t i = 0; i < expected.T_world_ref().size(); ++i) {
-    EXPECT_TRUE(isSame(session.T_world_ref()[i], expected.T_world_ref()[i])) << "keyframe " << i;
-    EXPECT_TRUE(isSame(session.T_odom_ref()[i], expected.T_odom_ref()[i])) << "keyframe " << i;
+/// Expects the same poses of all keyframes and the same points, bit for bit.
+inline void expectSameMap(const MapSnapshot& map, const MapSnapshot& expected) {
+  for (const auto trajectory : {&MapSnapshot::trajectory, &MapSnapshot::tracker_trajectory}) {
+    const std::vector<StampedPose>& poses = map.*trajectory;
+    ASSERT_EQ(poses.size(), (expected.*trajectory).size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const StampedPose& other = (expected.*trajectory)[i];
+      EXPECT_EQ(poses[i].t_ns, other.t_ns);
+      EXPECT_TRUE(isSame(poses[i].T_world_rig, other.T_world_rig)) << "keyframe " << i;
+    }
   }
-  EXPECT_EQ(session.cloud().points()->size(), expected.cloud().points()->size());
-  EXPECT_TRUE(test::sameBits(*session.cloud().points(), *expected.cloud().points()));
+  EXPECT_EQ(map.points->size(), expected.points->size());
+  EXPECT_TRUE(test::sameBits(*map.points, *expected.points));
+}
+
+inline void expectSameMap(MappingSession& session, MappingSession& expected) {
+  expectSameMap(*session.snapshot(true), *expected.snapshot(true));
 }
 
 }  // namespace efm

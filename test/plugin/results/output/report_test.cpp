@@ -16,13 +16,13 @@ using nlohmann::json;
 
 MapReport smallReport() {
   MapReport report;
-  report.counts.cameras = {{10, 6, 1, 1, 1, 1}, {5, 5, 0, 0, 0, 0}};
+  report.counts.cameras = {{10, 6, 1, 1, 1, 0, 0, 1}, {5, 5}};
   report.counts.event_uses = 20;
   report.counts.votes = {1500, 400, 100};
   report.counts.keyframes = 2;
   report.points = 7;
-  report.times.real = {9, 1, 4, 2, 0, 1.5};
-  report.times.cpu = {100, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+  report.times.real = {9, 1, 1.5, 2.5, 2, 0.5, 0, 1.5};
+  report.times.cpu = {100, 1, 0.5, 1.5, 3, 2, 4, 5, 6, 7, 8, 9, 10};
   report.options.mapper.keyframe.sweep.threads = 3;
   return report;
 }
@@ -57,7 +57,7 @@ void expectKeys(const json& written, const char* expected) {
 TEST(Report, EveryCountHasItsOwnKey) {
   MapReport report = smallReport();
   MapperCounts& counts = report.counts;
-  counts.cameras = {{69, 11, 7, 8, 9, 10, 6, 18}};
+  counts.cameras = {{96, 11, 7, 8, 12, 9, 15, 10, 6, 18}};
   counts.keyframes_without_pose = 12;
   counts.windows_without_events = 13;
   counts.silent_subintervals = 14;
@@ -70,18 +70,19 @@ TEST(Report, EveryCountHasItsOwnKey) {
   report.extent = MapExtent{{1, 2, 3}, {4, 5, 6}};
   report.most_extent = MapExtent{{1, 2, 3}, {4, 5, 5}};
   const json written = json::parse(reportJson(report));
-  EXPECT_EQ(written["events"]["cameras"], json::array({json::parse(R"({"read": 69, "used": 11,
-      "without_pose": 7, "outside_window": 8, "dropped": 9, "filtered": 10, "outside_lens": 6,
-      "over_budget": 18})")}));
+  EXPECT_EQ(written["events"]["cameras"], json::array({json::parse(R"({"read": 96, "used": 11,
+      "without_pose": 7, "outside_window": 8, "late": 12, "dropped": 9, "unselected": 15,
+      "filtered": 10, "outside_lens": 6, "over_budget": 18})")}));
   expectKeys(written, R"({
       "votes": {"cast": 1500, "outside_view": 400, "behind_camera": 100},
-      "seconds": {"total": 9, "read": 1, "sweep": 4, "depth": 2, "refine": 0, "map": 1.5},
+      "seconds": {"total": 9, "read": 1, "sweep": 4, "depth": 2, "motion": 0.5, "refine": 0,
+        "map": 1.5},
       "cpu_seconds": {"total": 100,
         "once": {"start": 8, "tables": 9, "output": 10},
         "events": {"read": 1, "filter": 6},
-        "keyframes": {"sweep": 2, "depth": 3, "refine": 4, "map": 5, "images": 7},
-        "other": 45},
-      "event_uses": 20, "keyframes": 2, "keyframes_without_pose": 12,
+        "keyframes": {"sweep": 2, "depth": 3, "motion": 2, "refine": 4, "map": 5, "images": 7},
+        "other": 43},
+      "schema": 1, "event_uses": 20, "keyframes": 2, "keyframes_without_pose": 12,
       "windows_without_events": 13, "silent": {"subintervals": 14, "keyframes": [0, 17]},
       "sorted_events": 15, "skipped_events": 3, "duplicate_poses": 16, "points": 7,
       "recording_seconds": 2.5, "peak_memory_bytes": 123,
@@ -173,11 +174,12 @@ TEST(Summary, EachFactHasItsLine) {
          report.counts.cameras[0] = {12'345'678, 0, 0, 12'345'678};
        },
        "events      under 0.1 % of 12.3 million used; 100.0 % outside the keyframes' windows\n"},
-      {[](MapReport& report) { report.counts.cameras[0] = {1000, 400, 10, 20, 30, 40, 200, 300}; },
+      {[](MapReport& report) {
+         report.counts.cameras[0] = {1000, 400, 10, 20, 25, 30, 15, 40, 160, 300};
+       },
        "events      40.0 % of 1000 used; 2.0 % outside the keyframes' windows, 1.0 % without a "
-       "pose, "
-       "4.0 % filtered as noise, 30.0 % over max_events_per_camera, 3.0 % too late, or of a camera "
-       "that takes no part, 20.0 % outside the lens model\n"},
+       "pose, 4.0 % filtered as noise, 30.0 % over max_events_per_camera, 2.5 % too late, 3.0 % in "
+       "dropped windows, 1.5 % of cameras that are not selected, 16.0 % outside the lens model\n"},
       {[](MapReport& report) {
          report.counts.cameras.push_back(report.counts.cameras[0]);
          report.counts.cameras[1][EventFate::kUsed] = 0;

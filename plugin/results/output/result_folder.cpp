@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/results/output/result_folder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "mapping/base/atomic_file.h"
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kReport = "report.json";
+constexpr const char* kKeyframes = "keyframes";
+constexpr const char* kLock = "run.lock";
+constexpr std::array<std::string_view, 8> kMapFiles = {
+    "map.html",      "map.pcd",      "map.png",        "map.ply",
+    "map.simplemap", "overview.png", "trajectory.txt", "trajectory_tracker.txt"};
+constexpr std::array<std::string_view, 2> kDepthFiles = {"points.pcd", "dsi.npy"};
+/// The images of one depth map.
+constexpr std::array<std::string_view, 5> kImages = {
+    "depth.tiff", "confidence.tiff", "probability.tiff", "depth.png", "confidence.png"};
+constexpr std::string_view kEventImage = "events.png";
+
+template <typename Names>
+bool isIn(const Names& names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool isCameraFolder(const std::string& name) {
+  return name.size() > 3 && name.rfind("cam", 0) == 0 &&
+         name.find_first_not_of("0123456789", 3) == std::string::npos;
+}
+
+bool isKeyframeFolder(const std::string& name) {
+  const std::optional<std::int64_t> t_ns = parseSeconds(name);
+  return t_ns && formatSeconds(*t_ns) == name;
+}
+
+/// The folders of a result, by what they may hold.
+enum class Level { kResult, kKeyframes, kKeyframe, kCamera };
+
+bool isFileOf(Level level, const std::string& name) {
+  switch (level) {
+    case Level::kResult:
+      return isIn(kMapFiles, name) || isIn(kDepthFiles, name) || isIn(kImages, name) ||
+             name == kReport || name == kLock;
+    case Level::kKeyframes:
+      return false;
+    case Level::kKeyframe:
+      return isIn(kImages, name);
+    case Level::kCamera:
+      return isIn(kImages, name) || name == kEventImage;
+  }
+  return false;
+}
+
+std::optional<Level> folderOf(Level level, const std::string& name) {
+  if (level == Level::kResult && name == kKeyframes) return Level::kKeyframes;
+  if (level == Level::kKeyframes && isKeyframeFolder(name)) return Level::kKeyframe;
+  const bool has_cameras = level == Level::kResult || level == Level::kKeyframe;
+  if (has_cameras && isCameraFolder(name)) return Level::kCamera;
+  return std::nullopt;
+}
+
+/// What belongs to a result below a folder: paths relative to it.
+struct ResultFiles {
+  std::vector<fs::path> files;    // the report last
+  std::vector<fs::path> folders;  // those within others first
+  bool all = true;                // nothing else is there
+};
+
+void collect(const fs::path& folder, const fs::path& below, Level level, ResultFiles& found) {
+  for (const auto& entry : fs::directory_iterator(folder / below)) {
+    const std::string name = entry.path().filename().string();
+    const fs::file_status status = entry.symlink_status();
+    if (fs::is_regular_file(status) && isFileOf(level, name)) {
+      found.files.push_back(below / name);
+    } else if (const auto inner = folderOf(level, name); inner && fs::is_directory(status)) {
+      collect(folder, below / name, *inner, found);
+      found.folders.push_back(below / name);
+    } else {
+      found.all = false;
+    }
+  }
+}
+
+ResultFiles filesIn(const fs::path& folder) {
+  ResultFiles found;
+  if (!fs::is_directory(folder)) return found;
+  collect(folder, {}, Level::kResult, found);
+  std::stable_partition(found.files.begin(), found.files.end(),
+                        [](const fs::path& file) { return file != kReport; });
+  return found;
+}
+
+/// Removes the empty ones among the folders of a result.
+void removeEmpty(const fs::path& folder, const ResultFiles& of) {
+  for (const fs::path& inner : of.folders) ::rmdir((folder / inner).c_str());
+}
+
+/// Moves the files of a result: the report last, so that a folder with a report is whole.
+void moveResult(const fs::path& from, const fs::path& to) {
+  const ResultFiles found = filesIn(from);
+  fs::create_directories(to);
+  for (const fs::path& file : found.files) {
+    if (file == kLock) continue;
+    fs::create_directories((to / file).parent_path());
+    fs::rename(from / file, to / file);
+  }
+  removeEmpty(from, found);
+  syncToDisk(to);
+}
+
+/// Removes the files of a result, the report first, and the folder if it is empty then.
+void removeResult(const fs::path& folder) {
+  ResultFiles found = filesIn(folder);
+  std::reverse(found.files.begin(), found.files.end());
+  for (const fs::path& file : found.files) ::unlink((folder / file).c_str());
+  removeEmpty(folder, found);
+  ::rmdir(folder.c_str());
+}
+
+bool hasReport(const fs::path& folder) { return fs::exists(folder / kReport); }
+
+/// Gives an earlier result its place back, if a run ended while it replaced the result.
+void recover(const ResultFolder::Places& places) {
+  if (fs::exists(places.moving)) {  // the run was moving the earlier result away
+    moveResult(places.moving, places.target);
+    return removeResult(places.moving);
+  }
+  if (!fs::exists(places.earlier)) return;
+  if (!places.in_place && !fs::exists(places.target)) {
+    return fs::rename(places.earlier, places.target);
+  }
+  if (places.in_place && !hasReport(places.target)) {  // the run was moving its own result here
+    moveResult(places.target, places.partial);
+    moveResult(places.earlier, places.target);
+  }
+  removeResult(places.earlier);
+}
+
+/// Returns a lock of the whole file. The lock belongs to the open file, not to the process, so it
+/// also excludes another run in the same process.
+flock wholeFile() {
+  flock lock{};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  return lock;
+}
+
+/// Rejects what has the name of a result's file, but is none.
+void rejectInTheWay(const fs::path& target) {
+  for (const auto& entry : fs::directory_iterator(target)) {
+    const std::string name = entry.path().filename().string();
+    const fs::file_status status = entry.symlink_status();
+    const bool is_file = isFileOf(Level::kResult, name);
+    if (is_file ? fs::is_regular_file(status) : name != kKeyframes || fs::is_directory(status)) {
+      continue;
+    }
+    throw std::runtime_error(entry.path().string() + ": has the name of a " +
+                             (is_file ? "file" : "folder") +
+                             " of the result: expected another folder for the result");
+  }
+}
+
+bool isAtWork(const fs::path& partial) {
+  const int file = ::open((partial / kLock).c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  flock lock = wholeFile();
+  const bool asked = ::fcntl(file, F_OFD_GETLK, &lock) == 0;
+  ::close(file);
+  return asked && lock.l_type != F_UNLCK;
+}
+
+std::runtime_error atWork(const fs::path& out) {
+  return std::runtime_error(out.string() +
+                            ": another run is writing its result there: expected another folder");
+}
+
+std::runtime_error cannotMake(const fs::path& folder, const std::string& why) {
+  return std::runtime_error("cannot make the folder " + folder.string() + ": " + why);
+}
+
+/// Returns whether a folder can be renamed in its parent folder.
+bool canBeRenamed(const fs::path& folder) {
+  struct stat own {};
+  struct stat parent {};
+  if (::stat(folder.c_str(), &own) != 0 || ::stat(folder.parent_path().c_str(), &parent) != 0) {
+    return false;
+  }
+  if (own.st_dev != parent.st_dev || own.st_ino == parent.st_ino) return false;  // a mount point
+  if (::access(folder.parent_path().c_str(), W_OK | X_OK) != 0) return false;
+  std::error_code ignored;
+  const fs::path working = fs::current_path(ignored);  // it would go with the earlier result
+  return std::mismatch(folder.begin(), folder.end(), working.begin(), working.end()).first !=
+         folder.end();
+}
+
+}  // namespace
+
+void makeFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (fs::is_directory(folder)) return;
+  throw cannotMake(folder, error ? error.message() : "a file of that name is there");
+}
+
+bool EarlierResult::isOf(const std::vector<std::string>& files) const {
+  const auto text = [](const std::vector<std::string>& names) {
+    return nlohmann::json(names).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  };
+  return text(recording) == text(files);
+}
+
+ResultFolder::Places::Places(const fs::path& out) {
+  if (out.empty()) throw std::runtime_error("'': expected the name of the folder to write");
+  target = fs::absolute(out);
+  if (fs::is_symlink(out) && !fs::exists(out)) {
+    target = fs::absolute(out).parent_path() / fs::read_symlink(out);
+    if (!fs::exists(target.string() + ".earlier")) {
+      throw cannotMake(out, "it is a link to a folder that does not exist");
+    }
+  }
+  target = fs::weakly_canonical(target);
+  if (!target.has_filename()) target = target.parent_path();
+  if (fs::exists(target) && !fs::is_directory(target)) {
+    throw cannotMake(out, "a file of that name is there");
+  }
+  const fs::path inner = target / "result";
+  in_place = fs::exists(target) &&
+             (!canBeRenamed(target) || !filesIn(target).all ||
+              fs::exists(inner.string() + ".earlier") || fs::exists(inner.string() + ".moving"));
+  const std::string base = in_place ? inner.string() : target.string();
+  partial = base + ".partial";
+  left = base + ".left";
+  earlier = base + ".earlier";
+  moving = base + ".moving";
+}
+
+std::optional<EarlierResult> ResultFolder::earlierResult(const fs::path& out) {
+  const fs::path file = out / kReport;
+  if (!fs::is_regular_file(file)) return std::nullopt;
+  std::ifstream stream(file);
+  const auto report = nlohmann::json::parse(stream, nullptr, false);
+  if (!report.is_object() || !report.contains("version") || !report.contains("options") ||
+      !report.contains("keyframes")) {
+    return std::nullopt;
+  }
+  try {
+    return EarlierResult{report.value("recording", std::vector<std::string>()),
+                         report["keyframes"].get<std::uint64_t>()};
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+bool ResultFolder::hasPartial(const fs::path& out) {
+  if (fs::exists(out) && !fs::is_directory(out)) return false;
+  return fs::exists(out / kLock) || fs::exists(Places(out).partial);
+}
+
+void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
+  const Places places(out);
+  if (isAtWork(places.partial)) throw atWork(out);
+  recover(places);
+  if (!fs::exists(places.target)) return;
+  rejectInTheWay(places.target);
+  if (force) return;
+  const auto has = [&](std::string_view name) { return fs::exists(places.target / name); };
+  const bool has_map = has(kKeyframes) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
+  const bool has_depth = std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
+                         std::any_of(kImages.begin(), kImages.end(), has);
+  if (!earlierResult(places.target)) {
+    const auto is_left = [&](const fs::path& path) {
+      return path == places.partial || path == places.left;
+    };
+    const fs::directory_iterator entries(places.target);
+    if (std::all_of(begin(entries), end(entries), is_left)) return;
+    throw std::runtime_error(out.string() +
+                             ": holds other files than a map's: expected a new folder, an empty "
+                             "one, one of an earlier result, or --force");
+  }
+  const bool is_map = kind == OutputKind::kMap;
+  if (is_map ? has_depth : has_map) {
+    throw std::runtime_error(fmt::format(
+        "{}: holds the result of `{}`: expected another folder, or --force to replace it",
+        out.string(), is_map ? "depth" : "map"));
+  }
+}
+
+ResultFolder::ResultFolder(fs::path out) : out_(std::move(out)), places_(out_) {
+  lock();
+  recover(places_);
+  if (countKeyframes(places_.partial) > 0) {  // of a run that was killed
+    removeResult(places_.left);
+    fs::rename(places_.partial, places_.left);
+    ::close(lock_);
+    lock();
+  }
+  for (const fs::path& file : filesIn(places_.partial).files) {
+    if (file != kLock) ::unlink((places_.partial / file).c_str());
+  }
+  removeEmpty(places_.partial, filesIn(places_.partial));
+  if (fs::exists(places_.left)) left_ = places_.left;
+}
+
+/// Makes the folder if it is not there, and locks it. @throws std::runtime_error if another run has
+/// it.
+void ResultFolder::lock() {
+  makeFolder(places_.partial);
+  const fs::path path = places_.partial / kLock;
+  lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (lock_ < 0) {
+    const std::string why = reasonNotWritten(errno);
+    throw std::runtime_error("cannot write " + path.string() + ": " +
+                             (why.empty() ? std::strerror(errno) : why));
+  }
+  flock lock = wholeFile();
+  if (::fcntl(lock_, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
+    ::close(lock_);
+    throw atWork(out_);
+  }  // on a file system without locks, another run is not detected
+}
+
+ResultFolder::~ResultFolder() {
+  if (!stays_) removeResult(places_.partial);
+  ::close(lock_);
+}
+
+void ResultFolder::commit() {
+  try {
+    replace();
+  } catch (const fs::filesystem_error& error) {
+    throw std::runtime_error(fmt::format("cannot replace {}: {} ({}); the new result is in {}",
+                                         out_.string(), error.code().message(),
+                                         error.path1().string(), places_.partial.string()));
+  }
+}
+
+void ResultFolder::replace() {
+  const auto& [target, in_place, partial, left, earlier, moving] = places_;
+  stays_ = true;
+  const ResultFiles found = filesIn(partial);
+  for (const fs::path& file : found.files) syncToDisk(partial / file);
+  for (const fs::path& folder : found.folders) syncToDisk(partial / folder);
+  syncToDisk(partial);
+  if (in_place) {
+    try {
+      moveResult(target, moving);
+      fs::rename(moving, earlier);
+      moveResult(partial, target);
+    } catch (...) {  // something of others may have come meanwhile
+      recover(places_);
+      throw;
+    }
+    removeResult(partial);
+    removeResult(earlier);
+  } else if (!fs::exists(target)) {
+    fs::rename(partial, target);
+  } else {
+    std::error_code ignored;
+    fs::permissions(partial, fs::status(target).permissions(), ignored);
+    if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+      removeResult(partial);
+    } else if (errno == EINVAL || errno == ENOSYS || errno == EOPNOTSUPP) {
+      fs::rename(target, earlier);
+      fs::rename(partial, target);
+      removeResult(earlier);
+    } else {
+      throw fs::filesystem_error("cannot be renamed", partial, target,
+                                 std::error_code(errno, std::generic_category()));
+    }
+  }
+  ::unlink((target / kLock).c_str());
+  syncToDisk(target.parent_path());
+  removeResult(left);
+}
+
+std::string ResultFolder::abandon() {
+  if (hasEarlier()) return fmt::format("; the earlier result in {} stays", out_.string());
+  const std::uint64_t keyframes = countKeyframes(places_.partial);
+  stays_ = keyframes > 0;
+  if (!stays_) return {};
+  return fmt::format("; the keyframes before it ({}) are in {}", keyframes,
+                     places_.partial.string());
+}
+
+std::uint64_t countKeyframes(const fs::path& folder) {
+  const ResultFiles found = filesIn(folder);
+  return static_cast<std::uint64_t>(
+      std::count_if(found.files.begin(), found.files.end(), [](const fs::path& file) {
+        return file.filename() == "depth.tiff" && !isCameraFolder(file.parent_path().filename());
+      }));
+}
+
+}  // namespace efm

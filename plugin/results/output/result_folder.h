@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace efm {
+
+/// The kind of files in a folder. A folder holds one kind.
+enum class OutputKind {
+  /// map.pcd, map.ply, map.simplemap, map.html, map.png, overview.png, trajectory.txt, report.json,
+  /// keyframes/<t_ref>/ with images
+  kMap,
+  kDepth,  ///< The images of one keyframe, points.pcd, dsi.npy, report.json.
+};
+
+/// The complete result of an earlier run in a folder.
+struct EarlierResult {
+  std::vector<std::string> recording;  ///< The files of the recording. Empty: unknown.
+  std::uint64_t keyframes = 0;
+
+  /// Returns whether the result is of these files. Bytes that are not UTF-8 are not compared.
+  bool isOf(const std::vector<std::string>& files) const;
+};
+
+/// The folder OUT of a result, which appears there whole or not at all.
+///
+/// The files are written to OUT.partial. At the end both folders exchange their names, and the
+/// earlier result is removed. If the file system cannot exchange names, the earlier result is
+/// OUT.earlier for a moment; after a crash in that moment, the next run gives it its name back. The
+/// files of a run that was killed stay in OUT.partial. The next run renames that folder to
+/// OUT.left, and removes it when its own result is whole.
+///
+/// Where OUT cannot be renamed (a mount point, the working folder, a parent that cannot be written)
+/// or holds other files, which stay, the folders lie within OUT: result.partial, result.left,
+/// result.earlier. At the end the earlier files are moved to result.earlier one by one (and called
+/// result.moving until then), and the new ones to OUT, report.json last. If OUT is a symbolic link,
+/// all this is about its target.
+class ResultFolder {
+ public:
+  /// Rejects a folder that is not for a result: another run is at work there, or, without `force`,
+  /// it holds other files and no earlier result, or one of another kind. Gives an earlier result
+  /// its name back after a crash.
+  /// @throws std::runtime_error naming the folder.
+  static void require(const std::filesystem::path& out, OutputKind kind, bool force);
+  /// Returns the result of either kind in a folder.
+  static std::optional<EarlierResult> earlierResult(const std::filesystem::path& out);
+  /// Returns whether a run is writing a result for this folder or into it, or left one there.
+  static bool hasPartial(const std::filesystem::path& out);
+
+  /// Makes the folder that is written to. No other run can do so until this object is destroyed.
+  /// @throws std::runtime_error naming the folder if it cannot be made, or another run is at work.
+  explicit ResultFolder(std::filesystem::path out);
+  /// Removes the files, unless `commit` or `abandon` was called.
+  ~ResultFolder();
+  ResultFolder(const ResultFolder&) = delete;
+  ResultFolder& operator=(const ResultFolder&) = delete;
+
+  /// Returns OUT, as the user gave it.
+  const std::filesystem::path& out() const { return out_; }
+  /// Returns the folder to write to.
+  const std::filesystem::path& path() const { return places_.partial; }
+  /// Returns the folder with the files of a run that was killed; empty if there is none.
+  const std::filesystem::path& left() const { return left_; }
+  /// Returns whether OUT has a result, which the commit replaces.
+  bool hasEarlier() const { return earlierResult(out_).has_value(); }
+
+  /// Waits until all files are on the disk, and replaces the earlier result.
+  /// @throws std::runtime_error. Then the earlier result is there, and the files stay in `path`.
+  void commit();
+  /// Ends without a result. If there is no earlier result, the keyframes so far stay in `path`.
+  /// @return what stays where, to add to an error; may be empty.
+  std::string abandon();
+
+  /// The places of a result.
+  struct Places {
+    explicit Places(const std::filesystem::path& out);
+
+    std::filesystem::path target;  ///< OUT without links.
+    bool in_place = false;         ///< The others lie within the target.
+    std::filesystem::path partial, left, earlier;
+    std::filesystem::path moving;  ///< In place: a part of the earlier result.
+  };
+
+ private:
+  void lock();
+  void replace();
+
+  std::filesystem::path out_;
+  Places places_;
+  std::filesystem::path left_;
+  int lock_ = -1;
+  bool stays_ = false;
+};
+
+/// Makes a folder and those above it. @throws std::runtime_error naming the folder.
+void makeFolder(const std::filesystem::path& folder);
+
+/// Returns the number of keyframes in the files of a run.
+std::uint64_t countKeyframes(const std::filesystem::path& folder);
+
+}  // namespace efm

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/results/output/result_folder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+#include <string>
+
+#include "test/plugin/temporary_folder.h"
+
+namespace {
+
+/// The process is killed before this change of names (1: the first one); 0: never.
+int g_kill_before = 0;
+/// False: the file system cannot exchange two names.
+bool g_exchanges = true;
+
+void countChange() {
+  if (g_kill_before > 0 && --g_kill_before == 0) kill(getpid(), SIGKILL);
+}
+
+int resultOf(long result) { return static_cast<int>(result); }
+
+}  // namespace
+
+// The changes of names of this program. They replace those of the C library.
+extern "C" {
+int rename(const char* from, const char* to) noexcept {
+  countChange();
+  return resultOf(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
+}
+int renameat2(int, const char* from, int, const char* to, unsigned int flags) noexcept {
+  countChange();
+  if (!g_exchanges) {
+    errno = EINVAL;
+    return -1;
+  }
+  return resultOf(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, flags));
+}
+int unlink(const char* path) noexcept {
+  countChange();
+  return resultOf(syscall(SYS_unlinkat, AT_FDCWD, path, 0));
+}
+int rmdir(const char* path) noexcept {
+  countChange();
+  return resultOf(syscall(SYS_unlinkat, AT_FDCWD, path, AT_REMOVEDIR));
+}
+}
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// The contents of all files below a folder, by their paths.
+using Files = std::map<std::string, std::string>;
+
+Files filesBelow(const fs::path& folder) {
+  Files files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    files[fs::relative(entry.path(), folder).string()] = readText(entry.path());
+  }
+  return files;
+}
+
+/// The result of a run, which all its files tell.
+Files resultOf(const std::string& run, int keyframes = 2) {
+  Files files;
+  for (const char* name : {"map.pcd", "map.html", "trajectory.txt"}) files[name] = run;
+  for (int i = 0; i < keyframes; ++i) {
+    for (const char* name : {"depth.tiff", "depth.png", "cam0/depth.tiff"}) {
+      files[fmt::format("keyframes/{}{}.000000000/{}", run.size(), i, name)] = run;
+    }
+  }
+  files["report.json"] =
+      fmt::format(R"({{"version": "1", "options": {{}}, "keyframes": {}, "recording": ["{}"]}})",
+                  keyframes, run);
+  return files;
+}
+
+void write(const fs::path& folder, const Files& files) {
+  for (const auto& [name, content] : files) writeFile(folder / name, content);
+}
+
+const Files kOthers = {{"notes.txt", "mine"}, {"keyframes/readme.txt", "mine"}};
+
+Files together(Files files, const Files& others) {
+  files.insert(others.begin(), others.end());
+  return files;
+}
+
+class ResultFolderTest : public TemporaryFolder {
+ protected:
+  /// Writes the result of a run to OUT.
+  void run(const fs::path& out, const std::string& name) {
+    ResultFolder folder(out);
+    write(folder.path(), resultOf(name));
+    folder.commit();
+  }
+  /// Runs in a process of its own. @return false if the process was killed.
+  static bool runApart(const std::function<void()>& work) {
+    const pid_t child = fork();
+    if (child == 0) {
+      work();
+      _exit(0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0);
+    return !WIFSIGNALED(status);
+  }
+};
+
+/// What OUT is before the run.
+enum class Before { kNothing, kEmpty, kResult, kOthers, kResultAndOthers, kLink };
+
+class EachBefore : public ResultFolderTest, public testing::WithParamInterface<Before> {
+ protected:
+  /// Makes the folder as it is before. @return its files.
+  Files make() {
+    fs::remove_all(folder() / "a");
+    fs::create_directories(folder() / "a");
+    const fs::path target = GetParam() == Before::kLink ? folder() / "a" / "target" : out();
+    if (GetParam() == Before::kNothing) return {};
+    fs::create_directories(target);
+    if (GetParam() == Before::kLink) fs::create_directory_symlink("target", out());
+    Files files;
+    if (GetParam() == Before::kOthers || GetParam() == Before::kResultAndOthers) files = kOthers;
+    if (GetParam() != Before::kEmpty && GetParam() != Before::kOthers) {
+      files = together(resultOf("old", 3), files);
+    }
+    write(target, files);
+    return files;
+  }
+  bool hasOthers() const {
+    return GetParam() == Before::kOthers || GetParam() == Before::kResultAndOthers;
+  }
+  fs::path out() const { return folder() / "a" / "out"; }
+  /// The new result, beside the files of others.
+  Files made() const { return together(resultOf("the new run"), hasOthers() ? kOthers : Files()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, EachBefore,
+                         testing::Values(Before::kNothing, Before::kEmpty, Before::kResult,
+                                         Before::kOthers, Before::kResultAndOthers, Before::kLink));
+
+TEST_P(EachBefore, TheResultIsThereAtTheEndAndNothingElse) {
+  const Files before = make();
+  {
+    ResultFolder folder(out());
+    EXPECT_EQ(folder.hasEarlier(), before.count("report.json") > 0);
+    write(folder.path(), resultOf("the new run"));
+    if (hasOthers()) {
+      EXPECT_EQ(folder.path(), fs::canonical(out()) / "result.partial");
+    } else {
+      EXPECT_EQ(folder.path().filename(),
+                GetParam() == Before::kLink ? "target.partial" : "out.partial");
+    }
+    folder.commit();
+  }
+  EXPECT_EQ(filesBelow(out()), made());
+  EXPECT_EQ(fs::is_symlink(out()), GetParam() == Before::kLink);
+  const auto entries = fs::directory_iterator(folder() / "a");
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), GetParam() == Before::kLink ? 2 : 1);
+}
+
+TEST_P(EachBefore, WithoutACommitAllIsAsBefore) {
+  const Files before = make();
+  { ResultFolder(out()).path(); }
+  { write(ResultFolder(out()).path(), resultOf("the new run")); }
+  EXPECT_EQ(filesBelow(folder() / "a").size(), before.size());
+  ResultFolder folder(out());
+  EXPECT_EQ(folder.abandon().find("stays") != std::string::npos, before.count("report.json") > 0);
+}
+
+/// Kills a run before each change of a name. After the next command has looked at the folder, the
+/// earlier result or the new one is whole, and the files of others are there.
+TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
+  for (const bool exchanges : {true, false}) {
+    bool ended = false;
+    int new_ones = 0;
+    for (int moment = 1; !ended; ++moment) {
+      SCOPED_TRACE(fmt::format("exchanges {}, moment {}", exchanges, moment));
+      const Files before = make();
+      ended = runApart([&] {
+        g_exchanges = exchanges;
+        ResultFolder folder(out());
+        write(folder.path(), resultOf("the new run"));
+        g_kill_before = moment;
+        folder.commit();
+      });
+      ResultFolder::require(out(), OutputKind::kMap, true);
+      Files after;
+      for (const auto& [name, content] : fs::exists(out()) ? filesBelow(out()) : Files()) {
+        if (name.find("result.") != 0 && name != "run.lock") after[name] = content;
+      }
+      EXPECT_TRUE(after == before || after == made());
+      new_ones += after == made() ? 1 : 0;
+      run(out(), "a third run");
+      EXPECT_EQ(filesBelow(out()),
+                together(resultOf("a third run"), hasOthers() ? kOthers : Files()));
+      const auto entries = fs::directory_iterator(folder() / "a");
+      EXPECT_EQ(std::distance(begin(entries), end(entries)), GetParam() == Before::kLink ? 2 : 1);
+      if (HasFailure()) return;
+    }
+    EXPECT_GT(new_ones, 0);
+  }
+}
+
+TEST_F(ResultFolderTest, TheWorkingFolderIsNotRenamed) {
+  const fs::path before = fs::current_path();
+  fs::create_directories(folder() / "b");
+  write(folder() / "b", resultOf("old"));
+  fs::current_path(folder() / "b");
+  for (const char* out : {".", "../b/", ""}) {
+    const fs::path path = *out == '\0' ? folder() : fs::path(out);  // also the folder above it
+    ResultFolder result(path);
+    EXPECT_EQ(result.path().filename(), "result.partial") << out;
+  }
+  run(".", "new");
+  EXPECT_EQ(filesBelow("."), resultOf("new"));
+  fs::current_path(before);
+}
+
+TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKept) {
+  const fs::path out = folder() / "out";
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t other = fork();
+  if (other == 0) {
+    ResultFolder result(out);
+    write(result.path(), resultOf("killed"));
+    static_cast<void>(::write(ready[1], "x", 1));
+    pause();
+    _exit(1);
+  }
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  const std::string at_work = out.string() + ": another run is writing its result there";
+  const auto require = [&] { ResultFolder::require(out, OutputKind::kMap, true); };
+  EXPECT_THAT(messageOf(require), HasSubstr(at_work));
+  EXPECT_THAT(messageOf([&] { ResultFolder result(out); }), HasSubstr(at_work));
+  EXPECT_TRUE(ResultFolder::hasPartial(out));
+  kill(other, SIGKILL);
+  waitpid(other, nullptr, 0);
+
+  require();
+  const fs::path left = folder() / "out.left";
+  {
+    ResultFolder result(out);
+    EXPECT_EQ(result.left(), left);
+    EXPECT_EQ(countKeyframes(left), 2U);
+    EXPECT_THAT(messageOf([&] { ResultFolder second(out); }), HasSubstr(at_work));
+  }
+  EXPECT_TRUE(fs::exists(left)) << "that run made no result";
+  EXPECT_FALSE(fs::exists(out));
+  run(out, "new");
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_EQ(filesBelow(folder()).size(), resultOf("new").size());
+}
+
+TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
+  const fs::path out = folder() / "out";
+  const Files keyframe = {{"keyframes/1.000000000/depth.tiff", ""}};
+  {
+    ResultFolder result(out);
+    EXPECT_EQ(result.abandon(), "") << "nothing was written";
+  }
+  EXPECT_TRUE(fs::is_empty(folder()));
+  {
+    ResultFolder result(out);
+    write(result.path(), keyframe);
+    EXPECT_EQ(result.abandon(),
+              "; the keyframes before it (1) are in " + out.string() + ".partial");
+  }
+  EXPECT_TRUE(fs::exists(folder() / "out.partial" / "keyframes"));
+  run(out, "old");
+  {
+    ResultFolder result(out);
+    write(result.path(), keyframe);
+    EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() + " stays");
+  }
+  EXPECT_EQ(filesBelow(folder()).size(), resultOf("old").size()) << "the disk may be full";
+  EXPECT_EQ(filesBelow(out), resultOf("old"));
+}
+
+TEST_F(ResultFolderTest, FoldersThatAreNotForAResultAreNamed) {
+  const fs::path out = folder() / "out";
+  const auto message = [&](OutputKind kind, bool force = false) {
+    return messageOf([&] { ResultFolder::require(out, kind, force); });
+  };
+  const std::string kNone = "no error";
+  EXPECT_EQ(message(OutputKind::kMap), kNone);
+  fs::create_directory(out);
+  EXPECT_EQ(message(OutputKind::kMap), kNone);
+  write(out, {{"notes.txt", ""}});
+  EXPECT_THAT(message(OutputKind::kMap), HasSubstr(out.string() + ": holds other files than"));
+  EXPECT_EQ(message(OutputKind::kMap, true), kNone);
+  for (const char* foreign : {"", "{}", "[1]", R"({"version": "1", "options": {}})", "text"}) {
+    write(out, {{"report.json", foreign}});
+    EXPECT_FALSE(ResultFolder::earlierResult(out)) << foreign;
+    EXPECT_THAT(message(OutputKind::kMap), HasSubstr(": holds other files than")) << foreign;
+  }
+  write(out, resultOf("old", 3));
+  const auto result = ResultFolder::earlierResult(out);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->keyframes, 3U);
+  EXPECT_TRUE(result->isOf({"old"}));
+  EXPECT_FALSE(result->isOf({"old", "older"}));
+  EXPECT_EQ(message(OutputKind::kMap), kNone) << "the files of others stay";
+  EXPECT_THAT(message(OutputKind::kDepth), HasSubstr("holds the result of `map`"));
+  EXPECT_EQ(message(OutputKind::kDepth, true), kNone);
+  fs::remove_all(out);
+  std::ofstream(out) << "a file";
+  EXPECT_THAT(message(OutputKind::kMap), HasSubstr(out.string() + ": a file of that name"));
+  fs::remove(out);
+  fs::create_symlink("nowhere", out);
+  EXPECT_THAT(message(OutputKind::kMap), HasSubstr("a link to a folder that does not exist"));
+  EXPECT_THAT(messageOf([&] { ResultFolder result(""); }),
+              HasSubstr("'': expected the name of the folder"));
+}
+
+}  // namespace
+}  // namespace efm
