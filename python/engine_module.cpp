@@ -21,10 +21,10 @@
 #include <vector>
 
 #include "arrays.h"
+#include "plugin/engine/host_text.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {

@@ -11,13 +11,13 @@
 
 #include "arrays.h"
 #include "mapping/depth/aggregated_extraction.h"
+#include "plugin/engine/host_text.h"
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/recording_info.h"
-#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {

@@ -26,9 +26,28 @@ struct CountsBy {
   friend bool operator==(const CountsBy& a, const CountsBy& b) { return a.counts == b.counts; }
 };
 
-/// The fate of an event. Each event has one fate, at the latest when the mapping ends.
+/// The row of a fate in the table of all fates of a kind, in the order of the enumerators.
+template <typename Kind>
+struct FateRow {
+  Kind fate;
+  const char* key;      ///< Key in report.json.
+  const char* text;     ///< Text after "5.1 %" in a summary.
+  bool is_loss = true;  ///< True if lost in live operation; false if the options ask for it.
+};
+
+/// Number of events with each fate of a table.
+template <const auto& kRows>
+struct FateCounts : CountsBy<decltype(kRows[0].fate), std::size(kRows)> {
+  /// Returns the number of events that are lost in live operation.
+  std::uint64_t losses() const {
+    std::uint64_t sum = 0;
+    for (const auto& row : kRows) sum += row.is_loss ? (*this)[row.fate] : 0;
+    return sum;
+  }
+};
+
+/// The fate of an event in the mapping. Each event has one, at the latest when the mapping ends.
 enum class EventFate {
-  // Fates in the mapping.
   kUsed,           ///< The event voted in at least one keyframe.
   kWithoutPose,    ///< The trajectory has no pose at its time.
   kOutsideWindow,  ///< The event is in no window that was mapped.
@@ -38,22 +57,9 @@ enum class EventFate {
   kFiltered,       ///< Removed as noise, with or without a pose.
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).
   kOverBudget,     ///< In a mapped window, but not among the events chosen for it.
-  // Fates in the queue of live operation, before the mapping.
-  kSubsampled,  ///< Subsampled: over the limit of events per second of sensor time.
-  kQueueFull,   ///< Dropped because the queue was full.
-  kRejected,    ///< Late, with a wrong time (`EventChecker`), or in a packet that is not possible.
-  kPaused,      ///< Arrived while map updating was disabled.
-  kAfterEnd,    ///< Arrived after the end of the input.
 };
 
-struct EventFateRow {
-  EventFate fate;
-  const char* key;      ///< Key in report.json.
-  const char* text;     ///< Text after "5.1 %" in a summary.
-  bool is_loss = true;  ///< True if lost in live operation; false if the options ask for it.
-};
-
-inline constexpr EventFateRow kEventFates[] = {
+inline constexpr FateRow<EventFate> kEventFates[] = {
     {EventFate::kUsed, "used", "used", false},
     {EventFate::kWithoutPose, "without_pose", "without a pose"},
     {EventFate::kOutsideWindow, "outside_window", "outside the keyframes' windows", false},
@@ -63,27 +69,11 @@ inline constexpr EventFateRow kEventFates[] = {
     {EventFate::kFiltered, "filtered", "filtered as noise", false},
     {EventFate::kOutsideLens, "outside_lens", "outside the lens model", false},
     {EventFate::kOverBudget, "over_budget", "over max_events_per_camera", false},
-
-    {EventFate::kSubsampled, "subsampled", "subsampled"},
-    {EventFate::kQueueFull, "dropped", "dropped"},
-    {EventFate::kRejected, "rejected", "rejected"},
-    {EventFate::kPaused, "paused", "paused", false},
-    {EventFate::kAfterEnd, "after_end", "after the end"},
 };
-constexpr const EventFateRow& rowOf(EventFate fate) {
+using EventFates = FateCounts<kEventFates>;
+constexpr const FateRow<EventFate>& rowOf(EventFate fate) {
   return kEventFates[static_cast<std::size_t>(fate)];
 }
-constexpr bool isOfQueue(EventFate fate) { return fate >= EventFate::kSubsampled; }
-
-/// Number of events with each fate.
-struct EventFates : CountsBy<EventFate, std::size(kEventFates)> {
-  /// Returns the number of events that are lost in live operation.
-  std::uint64_t losses() const {
-    std::uint64_t sum = 0;
-    for (const EventFateRow& row : kEventFates) sum += row.is_loss ? (*this)[row.fate] : 0;
-    return sum;
-  }
-};
 
 /// Counts of one camera's events in the mapping. `read` is the sum of the fates of the mapping.
 struct EventCounts {

@@ -19,7 +19,7 @@
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

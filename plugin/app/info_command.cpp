@@ -22,7 +22,7 @@
 #include "plugin/playback/recording_info.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

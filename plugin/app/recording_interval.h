@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "mapping/events/window.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/health_checks.h"
 
 namespace efm {
 

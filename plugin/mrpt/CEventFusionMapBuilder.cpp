@@ -14,12 +14,12 @@
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/engine/host_text.h"
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
-#include "plugin/session/host_text.h"
-#include "plugin/session/mapper_driver.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 

@@ -23,9 +23,9 @@
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/text.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/session/health_checks.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/mapper_driver.h"
+#include "plugin/engine/mapper_driver.h"
 
 namespace efm {
 

@@ -11,6 +11,8 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/keyframe_cloud.h"
+#include "plugin/engine/first_look.h"
+#include "plugin/engine/host_text.h"
 #include "plugin/playback/output_checks.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/results/output/keyframe_writer.h"
@@ -19,8 +21,6 @@
 #include "plugin/results/pictures/map_picture.h"
 #include "plugin/results/pictures/picture.h"
 #include "plugin/results/viewer/map_page.h"
-#include "plugin/session/first_look.h"
-#include "plugin/session/host_text.h"
 
 namespace efm {
 
@@ -178,7 +178,7 @@ Look lookAt(Job& job) {
   }
   if (takes) held->end();
 
-  auto [mapper, choice, verdict] = choose(samples.finish(), options, true);
+  auto [mapper, choice, verdict] = chooseAndJudge(samples.finish(), options);
   options.mapper = std::move(mapper);
   std::vector<std::string> doubts;
   if (options.automatic.any()) {

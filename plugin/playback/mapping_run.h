@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
+#include "plugin/checks/recording_statistics.h"
+#include "plugin/engine/map_watcher.h"
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/playback/error_text.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/results/output/report.h"
-#include "plugin/session/map_watcher.h"
-#include "plugin/session/mapper_driver.h"
-#include "plugin/session/recording_statistics.h"
 
 namespace efm {
 

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin/engine/first_look.h"
 #include "plugin/results/output/report.h"
-#include "plugin/session/first_look.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -21,7 +21,7 @@ void judge(FirstLook* look, RecordingInfo& info) {
   if (look != nullptr) {
     const RecordingSurvey survey = look->finish();
     if (!survey.samples.empty()) {
-      Chosen chosen = choose(survey, defaultOptions(), true);
+      Chosen chosen = chooseAndJudge(survey, defaultOptions());
       info.chosen = std::move(chosen.choice.options);
       findings.use(chosen.mapper.keyframe.planes, info.chosen);
       info.warnings = std::move(chosen.verdict.warnings);

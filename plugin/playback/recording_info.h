@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "mapping/base/option.h"
+#include "plugin/checks/health_checks.h"
+#include "plugin/checks/recording_statistics.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/health_checks.h"
-#include "plugin/session/recording_statistics.h"
 
 namespace efm {
 

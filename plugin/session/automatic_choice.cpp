@@ -74,7 +74,7 @@ Chosen MappingSession::chooseFrom(const std::optional<WindowData>& data,
   survey.rig = mapper_.rig();
   if (data) survey.samples.push_back(sampleOf(*data));
   survey.duration_s = duration_s;
-  return choose(survey, options_, false);
+  return choose(survey, options_);
 }
 
 /// Uses a choice from live data. Without a scene, uses wide depth limits or the options of the

@@ -25,6 +25,8 @@ std::size_t EventFusionOptions::keptKeyframes() const {
   return live.enabled ? static_cast<std::size_t>(live.max_keyframes) : RefinedCloud::kAll;
 }
 
+bool isCalibrated(const CameraModel& model) { return model.fx > 0 && model.fy > 0; }
+
 void requireCalibrated(int camera, const CameraModel& model) {
   if (isCalibrated(model)) return;
   throw OptionHint(

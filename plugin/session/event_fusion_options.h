@@ -103,6 +103,9 @@ struct EventFusionOptions {
 inline constexpr double kFirstWindowS = 1;
 inline constexpr double kFirstStrideS = 0.1;
 
+/// Returns whether the recording has the camera's calibration. Without it, the focal length is 0.
+bool isCalibrated(const CameraModel& model);
+
 /// @throws std::invalid_argument naming the camera, if it has no calibration.
 void requireCalibrated(int camera, const CameraModel& model);
 /// @throws std::invalid_argument if a camera has no calibration, or the options name a camera that

@@ -99,7 +99,7 @@ void Gate::add(int camera, std::vector<Event> events,
   } catch (const std::invalid_argument&) {
     QueueCounts& counts = cameraOf(camera).counts;
     counts.received += events.size();
-    counts.fates[ended_ ? EventFate::kAfterEnd : EventFate::kRejected] += events.size();
+    counts.fates[ended_ ? QueueFate::kAfterEnd : QueueFate::kRejected] += events.size();
     throw;
   }
   receive(camera, std::move(events), complete_until_ns);
@@ -109,7 +109,7 @@ void Gate::skip(int camera, const std::vector<Event>& events) {
   const std::lock_guard<std::mutex> lock(mutex_);
   QueueCounts& counts = cameraOf(camera).counts;
   counts.received += events.size();
-  counts.fates[EventFate::kPaused] += events.size();
+  counts.fates[QueueFate::kPaused] += events.size();
   if (ended_ || events.empty()) return;
   push(Input(Missing{camera, events.back().t_ns + 1, DropReason::kPaused}));
 }
@@ -168,7 +168,7 @@ void Gate::receive(int index, std::vector<Event> events,
   Camera& camera = cameraOf(index);
   camera.counts.received += events.size();
   if (ended_) {
-    camera.counts.fates[EventFate::kAfterEnd] += events.size();
+    camera.counts.fates[QueueFate::kAfterEnd] += events.size();
     return;
   }
   const auto first = std::find_if_not(
@@ -195,7 +195,7 @@ void Gate::receive(int index, std::vector<Event> events,
                     EventPacket{index, CheckedEvents(std::move(rest)), complete_until_ns});
   }
   late_events_ += late;
-  camera.counts.fates[EventFate::kRejected] += late;
+  camera.counts.fates[QueueFate::kRejected] += late;
   camera.complete_until_ns = complete_until_ns;
   if (!right.empty()) noteInTime(index, trajectoryTime(right.front().t_ns, offset_ns));
   pass(index, std::move(right));
@@ -219,7 +219,7 @@ void Gate::takeSettled(Camera& camera, std::vector<Event>& right) {
   for (const EventChecker::Settled& settled : camera.checker.takeSettled()) {
     --camera.waiting;
     if (settled.wrong) {
-      ++camera.counts.fates[EventFate::kRejected];
+      ++camera.counts.fates[QueueFate::kRejected];
     } else {
       right.push_back(settled.event);
     }
@@ -275,7 +275,7 @@ void Gate::dropOldest() {
   const EventPacket& oldest = packets_.front().second;
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
-  cameraOf(oldest.camera).counts.fates[EventFate::kQueueFull] += oldest.events.size();
+  cameraOf(oldest.camera).counts.fates[QueueFate::kQueueFull] += oldest.events.size();
   if (!oldest.events.empty()) {
     Missing& missing =
         missing_.try_emplace(oldest.camera, Missing{oldest.camera, kMinTimeNs}).first->second;
@@ -417,7 +417,7 @@ void Gate::rejectHeld(int sensor) {
       camera.older -= events;
       held_events_ -= events;
       late_events_ += events;
-      camera.counts.fates[EventFate::kRejected] += events;
+      camera.counts.fates[QueueFate::kRejected] += events;
     } else {
       push(std::move(one));  // the session rejects it
     }
@@ -547,7 +547,7 @@ std::map<int, QueueCounts> Gate::counts() const {
   for (const auto& [index, camera] : cameras_) {
     QueueCounts& of_camera = counts[index];
     of_camera = camera.counts;
-    of_camera.fates[EventFate::kSubsampled] = camera.budget.subsampled();
+    of_camera.fates[QueueFate::kSubsampled] = camera.budget.subsampled();
     of_camera.held = camera.budget.held() + camera.waiting + camera.older;
     of_camera.queued =
         of_camera.received - of_camera.held - of_camera.taken - of_camera.fates.total();

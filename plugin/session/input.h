@@ -6,7 +6,7 @@
 
 #include "mapping/keyframes/mapper_counts.h"
 #include "plugin/recordings/streams/sample.h"
-#include "plugin/session/first_look.h"
+#include "plugin/session/choice.h"
 
 namespace efm {
 

@@ -47,6 +47,23 @@ inline void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   span->last_ns = std::max(span->last_ns, t_ns);
 }
 
+/// The fate of an event before the mapping, in live operation.
+enum class QueueFate {
+  kSubsampled,  ///< Over the limit of events per second of sensor time.
+  kQueueFull,   ///< Dropped because the queue was full.
+  kRejected,    ///< Late, with a wrong time (`EventChecker`), or in a packet that is not possible.
+  kPaused,      ///< Arrived while map updating was disabled.
+  kAfterEnd,    ///< Arrived after the end of the input.
+};
+inline constexpr FateRow<QueueFate> kQueueFates[] = {
+    {QueueFate::kSubsampled, "subsampled", "subsampled"},
+    {QueueFate::kQueueFull, "dropped", "dropped"},
+    {QueueFate::kRejected, "rejected", "rejected"},
+    {QueueFate::kPaused, "paused", "paused", false},
+    {QueueFate::kAfterEnd, "after_end", "after the end"},
+};
+using QueueFates = FateCounts<kQueueFates>;
+
 /// Counts of one camera's events before the mapping, in live operation: received = held + queued +
 /// taken + the sum of the fates.
 struct QueueCounts {
@@ -56,7 +73,7 @@ struct QueueCounts {
   std::uint64_t taken = 0;  ///< Taken by the mapping: `EventCounts::read`, or `rejected_events`.
   /// Part of `taken`: rejected, or lost by fate. Not counted for a camera that takes no part.
   std::uint64_t lost = 0;
-  EventFates fates;  ///< Fates in the queue.
+  QueueFates fates;
 
   /// Returns the number of events that are lost in the queue or in the mapping.
   std::uint64_t losses() const { return fates.losses() + lost; }
@@ -77,7 +94,7 @@ struct LiveStatus {
   std::string last_error;    ///< Last error, also of rejected samples; empty: none.
   std::string too_large;     ///< Reason why the queue cannot hold a window; empty: it can.
 
-  /// Returns the fraction of the received events that are lost (`EventFateRow::is_loss`), 0 to 1.
+  /// Returns the fraction of the received events that are lost (`FateRow::is_loss`), 0 to 1.
   double dropRatio() const;
 };
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "plugin/session/map_watcher.h"
+#include "plugin/engine/map_watcher.h"
 
 namespace efm {
 

@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "plugin/mrpt/window/map_scene.h"
-#include "plugin/session/map_watcher.h"
+#include "plugin/engine/map_watcher.h"
 
 namespace efm {
 namespace {

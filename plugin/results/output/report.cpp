@@ -57,9 +57,7 @@ using Json = nlohmann::ordered_json;
 
 Json asJson(const EventCounts& counts) {
   Json json = {{"read", counts.read}};
-  for (const EventFateRow& row : kEventFates) {
-    if (!isOfQueue(row.fate)) json[row.key] = counts[row.fate];
-  }
+  for (const auto& row : kEventFates) json[row.key] = counts[row.fate];
   return json;
 }
 
@@ -146,9 +144,7 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
   Json cameras = Json::array();
   for (const auto& [index, camera] : live.cameras) {
     Json& of_camera = cameras.emplace_back(Json{{"camera", index}, {"received", camera.received}});
-    for (const EventFateRow& row : kEventFates) {
-      if (isOfQueue(row.fate)) of_camera[row.key] = camera.fates[row.fate];
-    }
+    for (const auto& row : kQueueFates) of_camera[row.key] = camera.fates[row.fate];
     of_camera["taken"] = camera.taken;
     of_camera["lost"] = camera.lost;
   }

@@ -372,30 +372,30 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
 }
 
 TEST(MapperCounts, AddUpNumberByNumber) {
-  const MapperCounts counts{{{1, {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13}}},
-                            14,
-                            {15, 16, 17},
-                            18,
-                            19,
-                            20,
-                            {21, 22, 23, 24, 25, 26, 27, 28},
-                            29,
-                            30,
-                            31,
+  const MapperCounts counts{{{1, {2, 3, 4, 5, 6, 7, 8, 9, 10}}},
+                            11,
+                            {12, 13, 14},
+                            15,
+                            16,
+                            17,
+                            {18, 19, 20, 21, 22, 23, 24, 25},
+                            26,
+                            27,
+                            28,
                             {33, 34, 0.5, std::log(2)}};
   MapperCounts sum = counts;
   sum += counts;
   const std::vector<std::uint64_t> numbers = numbersOf(sum);
-  ASSERT_EQ(numbers.size(), 33U);
+  ASSERT_EQ(numbers.size(), 28U);
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], 2 * (i + 1));
-  EXPECT_EQ(counts.dropped_windows.total(), 21U + 22 + 23 + 24 + 25 + 26 + 27 + 28);
+  EXPECT_EQ(counts.dropped_windows.total(), 18U + 19 + 20 + 21 + 22 + 23 + 24 + 25);
   sum.cameras.resize(2);
   EXPECT_EQ(sum.motion.known, 66U);
   EXPECT_EQ(sum.motion.corrected, 68U);
   EXPECT_DOUBLE_EQ(sum.motion.blur_px, 1);
   EXPECT_DOUBLE_EQ(sum.motion.log_gain, 2 * std::log(2));
-  sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, {}};
-  EXPECT_EQ(sum.total()[EventFate::kOverBudget], 17U);
+  sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, {}};
+  EXPECT_EQ(sum.total()[EventFate::kOverBudget], 21U);
   EXPECT_EQ(sum.total().read, 3U);
 }
 

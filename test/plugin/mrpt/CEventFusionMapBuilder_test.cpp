@@ -279,8 +279,8 @@ TEST_P(BuilderInEitherMode, WhileUpdatingIsDisabledPacketsAreSkippedAndThePoseGo
   std::uint64_t paused = 0;
   for (const auto& [camera, count] : status.paused_events) paused += count;
   if (GetParam())
-    paused = status.live->cameras.at(0).fates[EventFate::kPaused] +
-             status.live->cameras.at(1).fates[EventFate::kPaused];
+    paused = status.live->cameras.at(0).fates[QueueFate::kPaused] +
+             status.live->cameras.at(1).fates[QueueFate::kPaused];
   EXPECT_GT(paused, 100U);
   EXPECT_EQ(status.counts.total().read, 0U);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 0U);

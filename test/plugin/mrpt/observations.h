@@ -15,7 +15,7 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
-#include "test/plugin/session/mapper_of_rig.h"
+#include "test/plugin/engine/mapper_of_rig.h"
 
 namespace efm {
 

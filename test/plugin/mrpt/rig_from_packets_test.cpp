@@ -6,7 +6,7 @@
 #include <fstream>
 #include <functional>
 
-#include "plugin/session/mapper_driver.h"
+#include "plugin/engine/mapper_driver.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"

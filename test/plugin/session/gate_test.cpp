@@ -162,7 +162,7 @@ RC_GTEST_PROP(Gate, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, 
     counts.received += kind == kTake ? 0 : one.events;
     if (kind == kPause) {
       gate.skip(camera, eventsUntil(one.t_ns, one.events));
-      counts.fates[EventFate::kPaused] += one.events;
+      counts.fates[QueueFate::kPaused] += one.events;
       skipped += one.events > 0 ? 1 : 0;
     } else if (kind != kTake) {
       gate.add(packet(camera, one.t_ns, one.events));
@@ -172,7 +172,7 @@ RC_GTEST_PROP(Gate, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, 
       while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
              static_cast<double>(sum(bytes_of)) > options.max_queue_mb * 1e6) {
         const Waiting& oldest = waiting.front();
-        expected[oldest.camera].fates[EventFate::kQueueFull] += oldest.events;
+        expected[oldest.camera].fates[QueueFate::kQueueFull] += oldest.events;
         if (oldest.events > 0) {
           std::int64_t& until_ns = missing_ns.try_emplace(oldest.camera, kMinTimeNs).first->second;
           until_ns = std::max(until_ns, oldest.t_ns + 1);
@@ -445,11 +445,11 @@ TEST(Gate, EndPassesTheHeldEvents) {
   }
   EXPECT_TRUE(gate.isAtEnd());
   EXPECT_EQ(events, 10U);
-  EXPECT_EQ(gate.counts().at(0).fates[EventFate::kSubsampled], 20U);
-  EXPECT_EQ(gate.counts().at(0).fates[EventFate::kAfterEnd], 30U);
+  EXPECT_EQ(gate.counts().at(0).fates[QueueFate::kSubsampled], 20U);
+  EXPECT_EQ(gate.counts().at(0).fates[QueueFate::kAfterEnd], 30U);
   EXPECT_EQ(gate.counts().at(0).queued, 0U);
   gate.skip(0, eventsUntil(7, 5));
-  EXPECT_EQ(gate.counts().at(0).fates[EventFate::kPaused], 5U);
+  EXPECT_EQ(gate.counts().at(0).fates[QueueFate::kPaused], 5U);
   EXPECT_EQ(gate.counts().at(0).received, 65U);
   gate.add(PoseSample{{}, 1, {}, {}});
   EXPECT_EQ(gate.rejectedPoses(), 1U);

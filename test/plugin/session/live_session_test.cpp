@@ -135,7 +135,7 @@ class Run {
     RC_ASSERT(refinement.waiting + refinement.failures == 0U);
     gate_.add(sampleOf(recording_.poses[0]));
     gate_.add(0, {{0, 1, 1, true}}, {});
-    RC_ASSERT(gate_.counts().at(0).fates[EventFate::kAfterEnd] == 1U);
+    RC_ASSERT(gate_.counts().at(0).fates[QueueFate::kAfterEnd] == 1U);
     RC_ASSERT(gate_.rejectedPoses() >= 1U);
   }
 

@@ -9,7 +9,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
-#include "plugin/session/first_look.h"
+#include "plugin/engine/first_look.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -314,7 +314,7 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
     EXPECT_EQ(session.status().held_events, 0U);
     std::uint64_t rejected = 0;
     for (const auto& [camera, counts] : session.gate.counts()) {
-      rejected += counts.fates[EventFate::kRejected] + counts.fates[EventFate::kSubsampled];
+      rejected += counts.fates[QueueFate::kRejected] + counts.fates[QueueFate::kSubsampled];
     }
     expectEventsAddUp(session.status(), recording.totalEvents() + later.totalEvents() - rejected);
   }

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/session/gate.h"
-#include "plugin/session/mapper_driver.h"
 #include "plugin/session/mapping_session.h"
 #include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/synthetic_recording.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/live_mapper.h"
+#include "plugin/engine/live_mapper.h"
 
 #include <fmt/format.h>
 
@@ -300,9 +300,10 @@ void LiveMapper::warnOfLosses() {
   for (const auto& [camera, counts] : status.live->cameras) {
     losses += counts.losses();
     text += fmt::format("; camera {}: ", camera);
-    for (const EventFate fate :
-         {EventFate::kQueueFull, EventFate::kSubsampled, EventFate::kRejected}) {
-      text += fmt::format("{} {}, ", counts.fates[fate], rowOf(fate).text);
+    for (const QueueFate fate :
+         {QueueFate::kQueueFull, QueueFate::kSubsampled, QueueFate::kRejected}) {
+      const auto& row = kQueueFates[static_cast<std::size_t>(fate)];
+      text += fmt::format("{} {}, ", counts.fates[fate], row.text);
     }
     text += fmt::format("{} lost afterwards, of {} events", counts.lost, counts.received);
   }

@@ -23,14 +23,11 @@
 #include "mapping/survey/option_choice.h"
 #include "mapping/survey/pose_check.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/checks/recording_statistics.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
-
-/// Returns whether the recording has the camera's calibration. Without it, the focal length is 0.
-bool isCalibrated(const CameraModel& model);
 
 /// Returns the horizontal and vertical field of view, radians. Fisheye lens: the image's angle is
 /// proportional to the distance from the centre; other lenses: pinhole. Distortion is left out, so

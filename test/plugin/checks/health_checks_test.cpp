@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -540,22 +540,22 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
          camera.held = 40;  // like queued and paused events, held events are not lost
          camera.queued = 20;
          camera.lost = 10;
-         camera.fates[EventFate::kPaused] = 80;
-         camera.fates[EventFate::kRejected] = 1;
-         camera.fates[EventFate::kAfterEnd] = 2;
+         camera.fates[QueueFate::kPaused] = 80;
+         camera.fates[QueueFate::kRejected] = 1;
+         camera.fates[QueueFate::kAfterEnd] = 2;
          s.counts.dropped_windows[DropReason::kJump] = 3;
        }),
        "events-lost: 6.5 % of the events were lost; 3 windows dropped: 3 "},
-      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kSubsampled] = 1; }),
+      {live([](auto& s) { s.live->cameras[1].fates[QueueFate::kSubsampled] = 1; }),
        "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events were more than "
        "[live] max_event_rate lets pass"},
       {live([](auto& s) {
-         s.live->cameras[1].fates[EventFate::kSubsampled] = 1;
+         s.live->cameras[1].fates[QueueFate::kSubsampled] = 1;
          s.live->too_large = "a window needs 5 events";
        }),
        "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events were more than "
        "[live] max_event_rate lets pass; a window needs 5 events"},
-      {live([](auto& s) { s.live->cameras[1].fates[EventFate::kQueueFull] = 3; }),
+      {live([](auto& s) { s.live->cameras[1].fates[QueueFate::kQueueFull] = 3; }),
        "events-lost: 1.5 % of the events were lost; 0 windows dropped; the machine is too slow"},
       {live([](auto& s) {
          s.counts.dropped_windows[DropReason::kOverload] = 2;
@@ -563,7 +563,7 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        }),
        "events-lost: 0 % of the events were lost; 3 windows dropped: "},
       {live([](auto& s) {
-         s.live->cameras[1].fates[EventFate::kRejected] = 1;
+         s.live->cameras[1].fates[QueueFate::kRejected] = 1;
          s.live->rejected_poses = 2;
        }),
        "events-lost: 0.5 % of the events were lost; 0 windows dropped; 1 events and 2 poses were "

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "event_fusion/engine.h"
+#include "plugin/engine/host_text.h"
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/host_text.h"
-#include "plugin/session/mapper_driver.h"
 
 namespace efm {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/checks/health_checks.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/session/health_checks.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/host_text.h"
+#include "plugin/engine/host_text.h"
 
 #include <array>
 #include <cstddef>

@@ -13,7 +13,7 @@
 #include <variant>
 #include <vector>
 
-#include "plugin/session/mapper_driver.h"
+#include "plugin/engine/mapper_driver.h"
 #include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/session/synthetic_recording.h"

@@ -8,9 +8,9 @@
 #include <future>
 #include <new>
 
-#include "plugin/session/host_text.h"
+#include "plugin/engine/host_text.h"
 #include "test/memory/failing_allocation.h"
-#include "test/plugin/session/mapper_of_rig.h"
+#include "test/plugin/engine/mapper_of_rig.h"
 
 namespace efm {
 namespace {
@@ -306,8 +306,8 @@ TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
     std::uint64_t paused = 0;
     for (const auto& [camera, count] : status.paused_events) paused += count;
     if (isLive())
-      paused = status.live->cameras.at(0).fates[EventFate::kPaused] +
-               status.live->cameras.at(1).fates[EventFate::kPaused];
+      paused = status.live->cameras.at(0).fates[QueueFate::kPaused] +
+               status.live->cameras.at(1).fates[QueueFate::kPaused];
     EXPECT_GT(paused, 0U);
     EXPECT_EQ(paused + status.counts.total().read, fed);
     EXPECT_EQ(status.counts.dropped_windows.total(),
@@ -334,8 +334,8 @@ TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
   EXPECT_EQ(status.counts.total().read, events);
   if (!isLive()) return;
   expectSumsAgree(status);
-  EXPECT_EQ(status.live->cameras.at(0).fates[EventFate::kAfterEnd] +
-                status.live->cameras.at(1).fates[EventFate::kAfterEnd],
+  EXPECT_EQ(status.live->cameras.at(0).fates[QueueFate::kAfterEnd] +
+                status.live->cameras.at(1).fates[QueueFate::kAfterEnd],
             events);
   EXPECT_EQ(status.live->rejected_poses, poses);
   EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/mapper_driver.h"
+#include "plugin/engine/mapper_driver.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <stdexcept>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/host_text.h"
-#include "plugin/session/live_mapper.h"
-#include "plugin/session/playback_mapper.h"
+#include "plugin/engine/host_text.h"
+#include "plugin/engine/live_mapper.h"
+#include "plugin/engine/playback_mapper.h"
 
 namespace efm {
 namespace {

@@ -13,9 +13,9 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/geometry/trajectory_check.h"
+#include "plugin/checks/pose_motion.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/pose_motion.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/session_status.h"
 

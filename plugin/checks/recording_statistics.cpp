@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/recording_statistics.h"
+#include "plugin/checks/recording_statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/first_look.h"
+#include "plugin/engine/first_look.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/camera_check.h"
 #include "mapping/survey/depth_agreement.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 
 namespace efm {
 namespace {
@@ -163,21 +163,20 @@ void judge(const RecordingSurvey& survey, const FusionMapperOptions& options,
   }
 }
 
-}  // namespace
-
-PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) const {
+PoseVerdict judgePoses(const RecordingSurvey& survey, const FusionMapperOptions& options) {
   constexpr double kMaxChange = 0.08;  // of reliable depths
   constexpr double kMaxLeverM = 20;
   PoseVerdict verdict;
-  if (lever_m > kMaxLeverM) return verdict;  // long-lever: further checks would blame the poses
-  for (const RigCamera& camera : rig.cameras) {
+  if (survey.lever_m > kMaxLeverM)
+    return verdict;  // long-lever: further checks would blame the poses
+  for (const RigCamera& camera : survey.rig.cameras) {
     for (const Warning& warning : calibrationWarnings(0, camera.model)) {
       if (warning.name != "principal-point") return verdict;  // no pose explains such rays
     }
   }
   try {
-    judge(*this, options, verdict);
-    const auto sensitivity = depthSensitivity(rig, samples, options);
+    judge(survey, options, verdict);
+    const auto sensitivity = depthSensitivity(survey.rig, survey.samples, options);
     if (!sensitivity) return verdict;
     if (const auto warning = sensitivityWarning(*sensitivity)) verdict.warnings.push_back(*warning);
     if (sensitivity->per_10_ms > kMaxChange) {
@@ -190,31 +189,13 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
   return verdict;
 }
 
-void PoseVerdict::applyTo(FusionMapperOptions& options) const {
-  MotionCorrectionUse& use = options.keyframe.motion.correct_motion;
-  if (keep_motion && use == MotionCorrectionUse::kAuto) use = MotionCorrectionUse::kNever;
-}
+}  // namespace
 
-Chosen choose(const RecordingSurvey& survey, const EventFusionOptions& options, bool judges) {
-  Chosen chosen{options.mapper, {}, {}};
-  if (options.automatic.any()) {
-    chosen.choice = chooseOptions(options.automatic, survey.rig, survey.samples, survey.duration_s,
-                                  chosen.mapper);
-    const double passed =
-        options.live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
-    const double most = survey.most_events_per_s;
-    fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, chosen.mapper.policy,
-                 chosen.choice.options);
-  }
-  if (judges && options.checks) chosen.verdict = survey.judgePoses(chosen.mapper);
+Chosen chooseAndJudge(const RecordingSurvey& survey, const EventFusionOptions& options) {
+  Chosen chosen = choose(survey, options);
+  if (options.checks) chosen.verdict = judgePoses(survey, chosen.mapper);
   chosen.verdict.applyTo(chosen.mapper);
   return chosen;
-}
-
-double eventRate(const WindowData& data) {
-  std::size_t events = 0;
-  for (const EventSpan& span : data.events) events += span.size();
-  return static_cast<double>(events) / secondsBetween(data.window.t0_ns, data.window.t1_ns);
 }
 
 FirstLook::FirstLook(const EventFusionOptions& options)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 
 #include <fmt/format.h>
 

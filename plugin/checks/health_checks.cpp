@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,6 @@
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
-
-bool isCalibrated(const CameraModel& model) { return model.fx > 0 && model.fy > 0; }
 
 Eigen::Vector2d fieldOfView(const CameraModel& model) {
   const Eigen::Vector2d half{0.5 * model.width / model.fx, 0.5 * model.height / model.fy};

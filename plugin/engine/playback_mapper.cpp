@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/playback_mapper.h"
+#include "plugin/engine/playback_mapper.h"
 
 #include <fmt/format.h>
 
@@ -182,7 +182,7 @@ void PlaybackMapper::chooseIfDue() {
   const double seen_s = survey.duration_s.value_or(0);
   if (!finished_) survey.duration_s.reset();
   const EventFusionOptions& options = session_.options();
-  NewOptions found{choose(survey, options, true), !finished_};
+  NewOptions found{chooseAndJudge(survey, options), !finished_};
   OptionChoice& choice = found.chosen.choice;
   if (found.follow_depths) {  // at the end, following limits would be no better
     if (!choice.found_scene) choice = chooseWideDepths(options.automatic, found.chosen.mapper);

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "event_fusion/engine.h"
+#include "plugin/engine/host_text.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/host_text.h"
 
 namespace efm {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "mapping/events/event_checker.h"
-#include "plugin/session/mapper_driver.h"
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/session/pose_intake.h"
 
 namespace efm {

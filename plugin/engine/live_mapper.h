@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "plugin/engine/mapper_driver.h"
 #include "plugin/session/gate.h"
-#include "plugin/session/mapper_driver.h"
 
 namespace efm {
 

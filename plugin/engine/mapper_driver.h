@@ -17,10 +17,10 @@
 #include "event_fusion/engine.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/checks/health_checks.h"
+#include "plugin/checks/recording_statistics.h"
 #include "plugin/recordings/streams/sample.h"
-#include "plugin/session/health_checks.h"
 #include "plugin/session/mapping_session.h"
-#include "plugin/session/recording_statistics.h"
 
 namespace efm {
 

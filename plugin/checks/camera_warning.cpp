@@ -5,7 +5,7 @@
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/pose_motion.h"
+#include "plugin/checks/pose_motion.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

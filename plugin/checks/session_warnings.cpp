@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -114,9 +114,9 @@ void addLosses(const SessionStatus& status, Warnings& warnings) {
     std::uint64_t subsampled = 0, rejected = 0;
     bool overload = dropped[DropReason::kOverload] > 0;
     for (const auto& [index, camera] : status.live->cameras) {
-      overload = overload || camera.fates[EventFate::kQueueFull] > 0;
-      subsampled += camera.fates[EventFate::kSubsampled];
-      rejected += camera.fates[EventFate::kRejected];
+      overload = overload || camera.fates[QueueFate::kQueueFull] > 0;
+      subsampled += camera.fates[QueueFate::kSubsampled];
+      rejected += camera.fates[QueueFate::kRejected];
     }
     std::string why;
     if (rejected + rejected_poses > 0) {

@@ -11,57 +11,17 @@
 #include "mapping/survey/option_choice.h"
 #include "mapping/survey/scene_depths.h"
 #include "plugin/recordings/streams/sample.h"
+#include "plugin/session/choice.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/map_quality.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
 
-/// Result of a first look at the poses.
-struct PoseVerdict {
-  std::vector<Warning> warnings;
-  std::vector<Warning> notes;  ///< What could not be checked.
-  QualityFacts quality;
-  /// True if the calibration between cameras is wrong. A correction of the motion would then hide
-  /// it, and make the map worse.
-  bool keep_motion = false;
-
-  /// Switches the automatic correction of the motion off, if the motion is to be kept.
-  void applyTo(FusionMapperOptions& options) const;
-};
-
-/// Returns the events per second of all cameras together.
-double eventRate(const WindowData& data);
-
-/// Result of a first look at a recording: its cameras and some of its windows, evenly spread.
-struct RecordingSurvey {
-  Rig rig;
-  std::vector<WindowSample> samples;
-  /// Time from the first to the last event with a pose; std::nullopt if there is none.
-  std::optional<double> duration_s;
-  /// Highest event rate of a window, all cameras together.
-  double most_events_per_s = 0;
-  double lever_m = 0;  ///< Longest lever arm from the tracked body to the rig.
-  std::vector<UndistortionTable> undistortion;  ///< All sweeps of the samples share them.
-
-  /// Judges whether the poses explain the events, and how much the depths depend on the poses.
-  /// Errors are left to the pass that maps.
-  /// @param options of the mapper, with the window of the map.
-  PoseVerdict judgePoses(const FusionMapperOptions& options) const;
-};
-
-/// What is chosen for a recording, or for the beginning of a stream.
-struct Chosen {
-  FusionMapperOptions mapper;  ///< With the chosen values.
-  OptionChoice choice;
-  PoseVerdict verdict;  ///< About the poses, with these options.
-};
-
-/// Chooses the automatic options.
-/// @param judges whether the poses are judged, if the options have checks. Where they show that the
-/// calibration is wrong, the motion is not corrected.
-Chosen choose(const RecordingSurvey& survey, const EventFusionOptions& options, bool judges);
+/// Chooses the automatic options, and judges whether the poses explain the events and how much the
+/// depths depend on the poses, if the options have checks. Where they show that the calibration is
+/// wrong, the motion is not corrected. Errors are left to the pass that maps.
+Chosen chooseAndJudge(const RecordingSurvey& survey, const EventFusionOptions& options);
 
 /// First pass over a recording: takes some of its windows, evenly spread, without mapping them.
 /// Memory does not grow with the recording's length: above a million events per second and camera,

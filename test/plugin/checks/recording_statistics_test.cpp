@@ -5,9 +5,9 @@
 #include <numeric>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/health_checks.h"
+#include "plugin/checks/health_checks.h"
+#include "plugin/checks/recording_statistics.h"
 #include "plugin/session/pose_source_selector.h"
-#include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

@@ -11,7 +11,7 @@
 #include <future>
 #include <map>
 
-#include "test/plugin/session/mapper_of_rig.h"
+#include "test/plugin/engine/mapper_of_rig.h"
 
 namespace efm {
 namespace {
@@ -151,7 +151,7 @@ TEST(LiveMapper, TheCallerNeverWaitsAndTheNewestInputWins) {
   EXPECT_FALSE(mapper.points()->empty());
   const SessionStatus before = mapper.status();
   EXPECT_LE(before.live->cameras.at(0).queued + before.live->cameras.at(1).queued, 2500U);
-  EXPECT_GT(before.live->cameras.at(0).fates[EventFate::kQueueFull], 0U);
+  EXPECT_GT(before.live->cameras.at(0).fates[QueueFate::kQueueFull], 0U);
   go_on.set_value();
   mapper.finish();
 
@@ -379,7 +379,7 @@ RC_GTEST_PROP(LiveMapper, EachEventHasOneFate, ()) {
     const EventCounts counts = countsOf(status, camera);
     received += queue.received;
     kept += counts[EventFate::kUsed] + counts[EventFate::kOutsideWindow] +
-            queue.fates[EventFate::kPaused];
+            queue.fates[QueueFate::kPaused];
   }
   RC_ASSERT(std::abs(status.live->dropRatio() * static_cast<double>(received) -
                      static_cast<double>(received - kept)) < 0.5);
