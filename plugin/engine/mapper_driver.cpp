@@ -92,7 +92,7 @@ void MapperDriver::fixRig(const Rig& given) {
   useRig(rig);
   given_rig_ = given;
   rig_is_fixed_ = true;
-  const std::lock_guard<std::mutex> lock(statistics_mutex_);
+  const std::lock_guard<std::mutex> lock(copies_mutex_);
   statistics_.setCameras(rig, {});
 }
 
@@ -128,7 +128,7 @@ void MapperDriver::add(Sample sample) {
 }
 
 void MapperDriver::setSink(DsiSink* sink) {
-  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  const std::lock_guard<std::mutex> lock(copies_mutex_);
   sink_ = sink;
 }
 
@@ -139,19 +139,19 @@ void MapperDriver::feed(Input input) {
   if (const auto* const of_tracker = std::get_if<PoseSample>(&input)) pose = *of_tracker;
   session_.add(std::move(input));
   if (!pose) return;
-  const std::lock_guard<std::mutex> lock(statistics_mutex_);
+  const std::lock_guard<std::mutex> lock(copies_mutex_);
   statistics_.addPose(*pose);
 }
 
 std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
   DsiSink* sink = nullptr;
   {
-    const std::lock_guard<std::mutex> lock(newest_mutex_);
+    const std::lock_guard<std::mutex> lock(copies_mutex_);
     sink = sink_;
   }
   std::optional<KeyframeDepthMap> keyframe = session_.next(sink);
   if (!keyframe) return keyframe;
-  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  const std::lock_guard<std::mutex> lock(copies_mutex_);
   newest_depth_ = keyframe->map.depth;
   pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
   newest_planes_ = keyframe->planes;
@@ -161,7 +161,7 @@ std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
 // --- Results ---
 
 std::pair<cv::Mat1f, DepthPlanesOptions> MapperDriver::newestDepth() const {
-  const std::lock_guard<std::mutex> lock(newest_mutex_);
+  const std::lock_guard<std::mutex> lock(copies_mutex_);
   return {newest_depth_, newest_planes_};
 }
 
@@ -175,17 +175,14 @@ SessionStatus MapperDriver::statusForHost() const {
 
 std::vector<Warning> MapperDriver::warnings() {
   const bool ended = hasEnded();
-  PixelSizes pixels;
-  {
-    const std::lock_guard<std::mutex> lock(newest_mutex_);
-    pixels = pixel_sizes_;
-  }
   const EventFusionOptions used = usedOptions();
   const FusionMapperOptions& options = used.mapper;
   const SessionStatus state = status();
+  PixelSizes pixels;
   RecordingStatistics statistics;
   {
-    const std::lock_guard<std::mutex> lock(statistics_mutex_);
+    const std::lock_guard<std::mutex> lock(copies_mutex_);
+    pixels = pixel_sizes_;
     statistics = statistics_;
   }
   Findings findings{statistics, {}};

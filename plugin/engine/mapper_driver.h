@@ -114,11 +114,11 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   const Callbacks callbacks_;
   const RigSetup setup_;
   MappingSession session_;
-  mutable std::mutex cameras_mutex_;     // guards given_rig_ and rig_is_fixed_
-  Rig given_rig_;                        // as the host gave it
-  bool rig_is_fixed_ = false;            // the session knows the cameras
-  mutable std::mutex statistics_mutex_;  // guards statistics_; held for copies only
-  RecordingStatistics statistics_;       // of the poses, and in playback of added events
+  mutable std::mutex cameras_mutex_;  // guards given_rig_ and rig_is_fixed_
+  Rig given_rig_;                     // as the host gave it
+  bool rig_is_fixed_ = false;         // the session knows the cameras
+  mutable std::mutex copies_mutex_;   // guards statistics_ and the newest keyframe; for copies only
+  RecordingStatistics statistics_;    // of the poses, and in playback of added events
 
  private:
   void fixRig(const Rig& given);
@@ -127,7 +127,7 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   std::uint64_t told_choices_ = 0;
   bool blur_told_ = false;
 
-  mutable std::mutex newest_mutex_;  // guards the members below; held for copies only
+  // Under copies_mutex_.
   DsiSink* sink_ = nullptr;
   PixelSizes pixel_sizes_;
   cv::Mat1f newest_depth_;

@@ -62,7 +62,7 @@ void PlaybackMapper::useEvents(int camera, std::vector<Event> events,
       packet.complete_until_ns = std::min(*complete_until_ns, intake.waitsSinceNs());
     }
     inputs = confirmedBy(packet);
-    const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
+    const std::lock_guard<std::mutex> copies_lock(copies_mutex_);
     statistics_.addEvents(packet);
   }
   inputs.emplace_back(std::move(packet));
@@ -121,7 +121,7 @@ void PlaybackMapper::finish() {
       const auto camera = static_cast<int>(&intake - intakes_.data());
       if (pose_times_) intake.expectPoses(pose_times_->first_ns, pose_times_->last_ns);
       EventPacket packet{camera, intake.finish()};
-      const std::lock_guard<std::mutex> statistics_lock(statistics_mutex_);
+      const std::lock_guard<std::mutex> copies_lock(copies_mutex_);
       statistics_.addEvents(packet);
       rest.emplace_back(std::move(packet));
     }

@@ -60,8 +60,8 @@ bool MappingSession::chooseAutomatic() {
 
 bool MappingSession::chooseFromSoFar(double at_least_s) {
   if (!hasCameras() || waits_for_options_ || !options_.automatic.any()) return false;
-  std::optional<WindowData> data = mapper_.window();
-  if (!data) data = mapper_.rest();
+  std::optional<WindowData> data = store_.mapper.window();
+  if (!data) data = store_.mapper.rest();
   if (!data || lengthOf(*data) < at_least_s) return false;
   useLook(data, chooseFrom(data, std::nullopt));
   return true;
@@ -71,7 +71,7 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
 Chosen MappingSession::chooseFrom(const std::optional<WindowData>& data,
                                   std::optional<double> duration_s) const {
   RecordingSurvey survey;
-  survey.rig = mapper_.rig();
+  survey.rig = store_.mapper.rig();
   if (data) survey.samples.push_back(sampleOf(*data));
   survey.duration_s = duration_s;
   return choose(survey, options_);
@@ -84,11 +84,11 @@ void MappingSession::useLook(const std::optional<WindowData>& data, Chosen looke
   FusionMapperOptions& chosen = looked.mapper;
   if (!choice.found_scene && status_.choices > 0) {
     options_.automatic = {};
-    return mapper_.configure(options_.mapper.policy, planes());
+    return store_.mapper.configure(options_.mapper.policy, planes());
   }
   if (data) {
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-    const std::int64_t begin_ns = std::min(segment_.begin_ns, data->window.t0_ns);
+    const std::int64_t begin_ns = std::min(store_.segment.begin_ns, data->window.t0_ns);
     const double segment_s = secondsBetween(begin_ns, data->window.t1_ns);
     const bool jumps = break_ && std::holds_alternative<Jump>(*break_);
     if (jumps && segment_s < kFirstWindowS) {
@@ -102,39 +102,39 @@ void MappingSession::useLook(const std::optional<WindowData>& data, Chosen looke
 
 /// Returns a window to choose from. A tracker jump or a clock reset may cut the window.
 std::optional<WindowData> MappingSession::dataToChooseFrom() {
-  std::optional<WindowData> data = mapper_.window();
+  std::optional<WindowData> data = store_.mapper.window();
   if (data || !pieceEnds()) return data;
-  data = mapper_.rest();
+  data = store_.mapper.rest();
   return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
 }
 
 /// Returns whether tracker jumps left no window to choose from for 10 s. The first call begins the
 /// wait.
 bool MappingSession::hasWaitedTooLong() {
-  if (!status_.events) return false;
-  if (!no_scene_since_ns_) no_scene_since_ns_ = status_.events->last_ns;
-  return status_.events->last_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs;
+  if (!store_.events) return false;
+  if (!store_.no_scene_since_ns) store_.no_scene_since_ns = store_.events->last_ns;
+  return store_.events->last_ns - *store_.no_scene_since_ns >= kMaxSceneWaitNs;
 }
 
 /// Drops a window that shows no scene. If this piece of the input ends with it, goes on to the next
 /// piece. @return false if the wait for a scene was too long, or no piece follows.
 bool MappingSession::skipWithoutScene(const WindowData& data) {
   const Window& window = data.window;
-  if (!no_scene_since_ns_) no_scene_since_ns_ = window.t0_ns;
-  for (const EventSpan& span : data.events) events_without_scene_ += span.size();
-  if (window.t1_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs) return false;
-  if (events_without_scene_ > static_cast<std::size_t>(options_.live.max_queue_events)) {
+  if (!store_.no_scene_since_ns) store_.no_scene_since_ns = window.t0_ns;
+  for (const EventSpan& span : data.events) store_.events_without_scene += span.size();
+  if (window.t1_ns - *store_.no_scene_since_ns >= kMaxSceneWaitNs) return false;
+  if (store_.events_without_scene > static_cast<std::size_t>(options_.live.max_queue_events)) {
     return false;
   }
   if (secondsBetween(window.t0_ns, window.t1_ns) < kFirstWindowS) return endPiece();
-  mapper_.dropWindowsBefore(window.t1_ns, DropReason::kNoScene);
+  store_.mapper.dropWindowsBefore(window.t1_ns, DropReason::kNoScene);
   return true;
 }
 
 /// Uses the window of the options if it was shortened. @return true if it was.
 bool MappingSession::applyShorterWindow(double former_s) {
   if (options_.mapper.policy.window_s == former_s) return false;
-  mapper_.configure(options_.mapper.policy, planes());
+  store_.mapper.configure(options_.mapper.policy, planes());
   ++status_.choices;
   return true;
 }
@@ -151,11 +151,11 @@ bool MappingSession::shortenWindows(double events_per_s) {
 /// Shortens a chosen window if two consecutive segments between tracker jumps were too short for
 /// it.
 void MappingSession::fitIntoSegments(std::int64_t end_ns) {
-  const double length_s = secondsBetween(segment_.begin_ns, end_ns);
-  const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
-  const bool fits = keyframes > segment_.keyframes || length_s < kMinFirstWindowS;
-  segment_ = {end_ns, keyframes, fits ? 0 : segment_.too_short + 1};
-  if (segment_.too_short < 2 || options_.automatic.any()) return;
+  const double length_s = secondsBetween(store_.segment.begin_ns, end_ns);
+  const std::uint64_t keyframes = earlier_counts_.keyframes + store_.mapper.counts().keyframes;
+  const bool fits = keyframes > store_.segment.keyframes || length_s < kMinFirstWindowS;
+  store_.segment = {end_ns, keyframes, fits ? 0 : store_.segment.too_short + 1};
+  if (store_.segment.too_short < 2 || options_.automatic.any()) return;
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
@@ -165,7 +165,7 @@ void MappingSession::fitIntoSegments(std::int64_t end_ns) {
 void MappingSession::use(NewOptions given) {
   PoseVerdict& verdict = given.chosen.verdict;
   waits_for_options_ = false;
-  mapper_.setMotion(given.chosen.mapper.keyframe.motion);
+  store_.mapper.setMotion(given.chosen.mapper.keyframe.motion);
   status_.pose_warnings = std::move(verdict.warnings);
   status_.pose_notes = std::move(verdict.notes);
   facts_ = std::move(verdict.quality);
@@ -181,7 +181,7 @@ void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen)
   if (automatic_.min_depth_m || automatic_.max_depth_m) {
     depth_follower_.emplace(automatic_, planes, choice.parallax_px_m);
   }
-  mapper_.configure(chosen.policy, planes);
+  store_.mapper.configure(chosen.policy, planes);
   if (choice.voxel_size_m) {
     options_.cloud.voxel_size_m = *choice.voxel_size_m;
     cloud_ = RefinedCloud(options_.cloud, options_.movableKeyframes());
@@ -201,10 +201,10 @@ void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen)
 /// depth limits.
 void MappingSession::lookAgain(const Window& window) {
   if (depth_follower_->misfits() == 0) look_interval_ns_ = kLookIntervalNs;
-  if (depth_follower_->misfits() < kMaxMisfits || window.t1_ns < look_again_ns_) return;
-  look_again_ns_ = window.t1_ns + look_interval_ns_;
+  if (depth_follower_->misfits() < kMaxMisfits || window.t1_ns < store_.look_again_ns) return;
+  store_.look_again_ns = window.t1_ns + look_interval_ns_;
   options_.automatic = automatic_;
-  mapper_.configure(mapperOptions(options_).policy, planes());
+  store_.mapper.configure(mapperOptions(options_).policy, planes());
 }
 
 }  // namespace efm

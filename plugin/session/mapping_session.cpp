@@ -20,7 +20,7 @@ MappingSession::MappingSession(const EventFusionOptions& options,
     : automatic_(options.automatic),
       options_(options),
       pose_source_(options.rig.pose_source),
-      mapper_(mapperOptions(options)),
+      store_(mapperOptions(options)),
       waits_for_options_(choice_by == ChoiceBy::kCaller && options.automatic.any()),
       cloud_(options.cloud, options.movableKeyframes()),
       facts_(std::move(facts)) {
@@ -37,7 +37,7 @@ MappingSession::MappingSession(const EventFusionOptions& options,
 
 void MappingSession::addCameras(const Rig& rig) {
   const StageScope scope(&status_.times, &StageSeconds::tables);
-  for (const RigCamera& camera : rig.cameras) mapper_.addCamera(camera);
+  for (const RigCamera& camera : rig.cameras) store_.mapper.addCamera(camera);
 }
 
 void MappingSession::add(Input input) {
@@ -56,26 +56,27 @@ void MappingSession::add(Input input) {
 
 void MappingSession::addEvents(EventPacket packet) {
   const int camera = packet.camera;
-  const std::uint64_t complete = mapper_.readEvents() + packet.events.size();
+  const std::uint64_t complete = store_.mapper.readEvents() + packet.events.size();
   try {
     feed(std::move(packet));
   } catch (...) {  // contradicts its camera, or no memory
-    status_.rejected_events[camera] += complete - mapper_.readEvents();
+    status_.rejected_events[camera] += complete - store_.mapper.readEvents();
     throw;
   }
 }
 
 void MappingSession::feed(EventPacket packet) {
   const std::int64_t offset_ns =
-      mapper_.rig().cameras.at(static_cast<std::size_t>(packet.camera)).time_offset_ns;
+      store_.mapper.rig().cameras.at(static_cast<std::size_t>(packet.camera)).time_offset_ns;
   const bool empty = packet.events.empty();
   const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
   {
     const StageScope scope(&status_.times, &StageSeconds::filter, Processors::kThis);
-    mapper_.addEvents(packet.camera, std::move(packet.events));
+    store_.mapper.addEvents(packet.camera, std::move(packet.events));
   }
-  if (packet.complete_until_ns) mapper_.setCompleteUntil(packet.camera, *packet.complete_until_ns);
+  if (packet.complete_until_ns)
+    store_.mapper.setCompleteUntil(packet.camera, *packet.complete_until_ns);
   if (empty) {
     if (!packet.complete_until_ns) return;
     dropMissing(packet.camera, trajectoryTime(*packet.complete_until_ns, offset_ns));
@@ -83,12 +84,12 @@ void MappingSession::feed(EventPacket packet) {
   }
   dropMissing(packet.camera, std::max(first_ns, last_ns) + offset_ns);
   const std::int64_t begin_ns = first_ns + offset_ns;
-  if (!status_.events) segment_.begin_ns = begin_ns;
-  extend(status_.events, begin_ns);
-  extend(status_.events, last_ns + offset_ns);
-  newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
-  dropOverdue(*newest_begin_ns_);
-  if (*newest_begin_ns_ - status_.events->first_ns > kMaxSourceWaitNs) useSelected();
+  if (!store_.events) store_.segment.begin_ns = begin_ns;
+  extend(store_.events, begin_ns);
+  extend(store_.events, last_ns + offset_ns);
+  store_.newest_begin_ns = std::max(store_.newest_begin_ns.value_or(begin_ns), begin_ns);
+  dropOverdue(*store_.newest_begin_ns);
+  if (*store_.newest_begin_ns - store_.events->first_ns > kMaxSourceWaitNs) useSelected();
 }
 
 void MappingSession::addPose(const PoseSample& sample) {
@@ -98,13 +99,13 @@ void MappingSession::addPose(const PoseSample& sample) {
   }
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // If two poses have the same time, the first one is used, and so is its noise.
-  if (refinement_ && used) noises_[source].try_emplace(sample.t_ns, sample.noise);
+  if (refinement_ && used) store_.noises[source].try_emplace(sample.t_ns, sample.noise);
 }
 
 /// Returns the stated noise of the last pose up to a time. Forgets the noise of earlier poses.
 std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   if (!pose_source_.selected()) return std::nullopt;
-  auto& noises = noises_[*pose_source_.selected()];
+  auto& noises = store_.noises[*pose_source_.selected()];
   const auto after = noises.upper_bound(t_ns);
   if (after == noises.begin()) return std::nullopt;
   noises.erase(noises.begin(), std::prev(after));
@@ -113,13 +114,13 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
 
 void MappingSession::usePose(const StampedPose& pose) {
   try {
-    mapper_.addPose(pose);
+    store_.mapper.addPose(pose);
   } catch (const std::invalid_argument&) {
     ++live_.rejected_poses;
     throw;
   }
   extend(status_.poses, pose.t_ns);
-  newest_pose_ns_ = std::max(newest_pose_ns_.value_or(pose.t_ns), pose.t_ns);
+  store_.newest_pose_ns = std::max(store_.newest_pose_ns.value_or(pose.t_ns), pose.t_ns);
 }
 
 /// Selects a source of poses, if there is none yet, and uses its waiting poses, also after a
@@ -139,17 +140,17 @@ void MappingSession::useSelected() {
 void MappingSession::noteMissing(const Missing& missing) {
   constexpr double kEnoughS = 0.2;
   if (missing.reason == DropReason::kOverload) chooseFromSoFar(kEnoughS);
-  Missing& noted = missing_.try_emplace(missing.camera, missing).first->second;
+  Missing& noted = store_.missing.try_emplace(missing.camera, missing).first->second;
   noted.until_ns = std::max(noted.until_ns, missing.until_ns);
   noted.reason = missing.reason;
 }
 
 /// Returns the end of what is missing, on the clock of the poses; std::nullopt if nothing is.
 std::optional<std::int64_t> MappingSession::missingUntil(int camera) const {
-  const auto missing = missing_.find(camera);
+  const auto missing = store_.missing.find(camera);
   const auto index = static_cast<std::size_t>(camera);
-  const std::vector<RigCamera>& cameras = mapper_.rig().cameras;
-  if (missing == missing_.end() || index >= cameras.size()) return std::nullopt;
+  const std::vector<RigCamera>& cameras = store_.mapper.rig().cameras;
+  if (missing == store_.missing.end() || index >= cameras.size()) return std::nullopt;
   return trajectoryTime(missing->second.until_ns, cameras[index].time_offset_ns);
 }
 
@@ -158,14 +159,14 @@ std::optional<std::int64_t> MappingSession::missingUntil(int camera) const {
 void MappingSession::dropMissing(int camera, std::int64_t next_ns) {
   const std::optional<std::int64_t> until_ns = missingUntil(camera);
   if (!until_ns) return;
-  mapper_.dropWindowsBefore(std::min(*until_ns, next_ns), missing_.at(camera).reason);
-  missing_.erase(camera);
+  store_.mapper.dropWindowsBefore(std::min(*until_ns, next_ns), store_.missing.at(camera).reason);
+  store_.missing.erase(camera);
 }
 
 /// Drops the windows that need missing events of cameras that send nothing any more.
 /// @param newest_begin_ns begin of the newest packet of any camera.
 void MappingSession::dropOverdue(std::int64_t newest_begin_ns) {
-  const std::map<int, Missing> missing = missing_;
+  const std::map<int, Missing> missing = store_.missing;
   for (const auto& [camera, events] : missing) {
     const std::optional<std::int64_t> until_ns = missingUntil(camera);
     if (until_ns && *until_ns <= newest_begin_ns) dropMissing(camera, kMaxTimeNs);
@@ -179,7 +180,7 @@ bool MappingSession::endPiece() {
   const auto ended = *std::exchange(break_, std::nullopt);
   if (const auto* jump = std::get_if<Jump>(&ended)) {
     ++live_.pose_jumps;
-    mapper_.dropWindowsBefore(jump->after_ns, DropReason::kJump);
+    store_.mapper.dropWindowsBefore(jump->after_ns, DropReason::kJump);
     fitIntoSegments(jump->after_ns);
   } else {
     ++live_.clock_resets;
@@ -190,30 +191,21 @@ bool MappingSession::endPiece() {
 
 /// Maps with the new clock from now on, and keeps the map so far.
 void MappingSession::restartMapper() {
-  FusionMapper fresh(mapperOptions(options_));  // completed before its use: memory may run out
-  for (const RigCamera& rig_camera : mapper_.rig().cameras) fresh.addCamera(rig_camera);
-  if (depth_follower_) fresh.setPlanes(depth_follower_->planes());
-  mapper_.dropAllWindows(DropReason::kClockReset);
-  earlier_counts_ += mapper_.counts();
-  mapper_ = std::move(fresh);
-  segment_ = {};
-  status_.events.reset();
-  newest_begin_ns_.reset();
-  newest_pose_ns_.reset();
-  missing_.clear();
-  noises_.clear();
+  EventStore fresh(mapperOptions(options_));  // completed before its use: memory may run out
+  for (const RigCamera& camera : store_.mapper.rig().cameras) fresh.mapper.addCamera(camera);
+  if (depth_follower_) fresh.mapper.setPlanes(depth_follower_->planes());
+  store_.mapper.dropAllWindows(DropReason::kClockReset);
+  earlier_counts_ += store_.mapper.counts();
+  store_ = std::move(fresh);
   pose_source_.forgetWaiting();
-  no_scene_since_ns_.reset();
-  events_without_scene_ = 0;
-  look_again_ns_ = kMinTimeNs;
 }
 
 void MappingSession::finish() {
   endPiece();
   finished_ = true;
   dropOverdue(kMaxTimeNs);
-  missing_.clear();
-  mapper_.finish();
+  store_.missing.clear();
+  store_.mapper.finish();
   useSelected();
 }
 
@@ -222,28 +214,31 @@ void MappingSession::limitWaits() {
   if (finished_) return;
   pose_source_.limitWaiting(kMaxEventWaitNs);
   std::optional<std::int64_t> newest_ns = pose_source_.waitingNs();
-  if (newest_pose_ns_) {
-    newest_ns = *newest_pose_ns_;
-    mapper_.setAllCompleteUntil(*newest_ns - kMaxEventWaitNs);
+  if (store_.newest_pose_ns) {
+    newest_ns = *store_.newest_pose_ns;
+    store_.mapper.setAllCompleteUntil(*newest_ns - kMaxEventWaitNs);
   }
   if (newest_ns) {
     const std::int64_t needed_ns = std::max(*newest_ns, -kEndOfTimeNs) - kMaxEventWaitNs;
-    for (auto& [source, noises] : noises_) {
+    for (auto& [source, noises] : store_.noises) {
       noises.erase(noises.begin(), noises.lower_bound(needed_ns));
     }
   }
-  if (!status_.events) return;
+  if (!store_.events) return;
   const std::int64_t overdue_ns =
-      status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
+      store_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
   if (!newest_ns || *newest_ns < overdue_ns) {
-    mapper_.dropWindowsBefore(overdue_ns, DropReason::kNoPose);
+    store_.mapper.dropWindowsBefore(overdue_ns, DropReason::kNoPose);
   }
 }
 
 void MappingSession::limitHeld(double max_events) {
-  const auto is_excess = [&] { return static_cast<double>(mapper_.heldEvents()) > max_events; };
+  const auto is_excess = [&] {
+    return static_cast<double>(store_.mapper.heldEvents()) > max_events;
+  };
   constexpr double kEnoughS = 0.001;
-  if (static_cast<double>(mapper_.heldEvents()) > options_.live.queueEvents() / 2) useSelected();
+  if (static_cast<double>(store_.mapper.heldEvents()) > options_.live.queueEvents() / 2)
+    useSelected();
   if (is_excess() && chooseFromSoFar(kEnoughS)) return;
   while (is_excess() && dropOldestWindow()) {
   }
@@ -252,7 +247,7 @@ void MappingSession::limitHeld(double max_events) {
 
 std::optional<Window> MappingSession::nextWindow() {
   if (!hasCameras() || options_.automatic.any()) return std::nullopt;
-  return mapper_.nextWindow();
+  return store_.mapper.nextWindow();
 }
 
 /// Drops the oldest window that could be mapped, if newer events fill another window.
@@ -260,17 +255,18 @@ std::optional<Window> MappingSession::nextWindow() {
 bool MappingSession::dropOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
-  if (mapper_.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
-  mapper_.dropWindow(*oldest, DropReason::kOverload);
+  if (store_.mapper.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns))
+    return false;
+  store_.mapper.dropWindow(*oldest, DropReason::kOverload);
   return true;
 }
 
 void MappingSession::dropOlderHalf() {
-  const std::int64_t oldest_ns = mapper_.oldestHeldNs();
-  if (!status_.events || oldest_ns >= status_.events->last_ns) return;
-  const std::int64_t held_ns = status_.events->last_ns - oldest_ns;
+  const std::int64_t oldest_ns = store_.mapper.oldestHeldNs();
+  if (!store_.events || oldest_ns >= store_.events->last_ns) return;
+  const std::int64_t held_ns = store_.events->last_ns - oldest_ns;
   const double rate =
-      static_cast<double>(mapper_.heldEvents()) / (1e-9 * static_cast<double>(held_ns));
+      static_cast<double>(store_.mapper.heldEvents()) / (1e-9 * static_cast<double>(held_ns));
   const KeyframePolicyOptions& policy = options_.mapper.policy;
   const double needed = policy.policy == KeyframePolicyKind::kEvents
                             ? static_cast<double>(policy.window_events)
@@ -278,10 +274,10 @@ void MappingSession::dropOlderHalf() {
   const double queue_events = options_.live.queueEvents();
   const bool too_large =  // because of its own rate, not of other waiting events
       hasCameras() && !options_.automatic.any() && needed > queue_events &&
-      static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
+      static_cast<double>(store_.mapper.heldEvents()) > queue_events / 2;
   if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
-  mapper_.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
-                            too_large ? DropReason::kTooLarge : DropReason::kOverload);
+  store_.mapper.dropWindowsBefore(oldest_ns + held_ns / 2 + 1,
+                                  too_large ? DropReason::kTooLarge : DropReason::kOverload);
   constexpr double kNews = 1.2;  // factor after which a larger window is reported again
   if (!too_large || needed < kNews * reported_needed_) return;
   reported_needed_ = needed;
@@ -294,24 +290,24 @@ void MappingSession::dropOlderHalf() {
 }
 
 bool MappingSession::dropFailedWindow() {
-  return std::exchange(keyframe_lost_, false) || mapper_.dropFailedWindow();
+  return std::exchange(keyframe_lost_, false) || store_.mapper.dropFailedWindow();
 }
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
   keyframe_lost_ = false;
   if (!hasCameras() || !chooseAutomatic()) return std::nullopt;
-  std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &status_.times);
-  while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &status_.times);
+  std::optional<KeyframeDepthMap> keyframe = store_.mapper.next(sink, &status_.times);
+  while (!keyframe && endPiece()) keyframe = store_.mapper.next(sink, &status_.times);
   if (!keyframe && finished_) leaveOutBad(quality_.keyframes());
   if (keyframe) {
     try {
       if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
-        mapper_.setPlanes(depth_follower_->planes());
+        store_.mapper.setPlanes(depth_follower_->planes());
       }
       if (depth_follower_) lookAgain(keyframe->window);
       insert(*keyframe);
     } catch (...) {
-      mapper_.loseKeyframe();
+      store_.mapper.loseKeyframe();
       keyframe_lost_ = true;
       throw;
     }
@@ -333,9 +329,9 @@ void MappingSession::insert(KeyframeDepthMap& keyframe) {
   if (options_.checks) {
     judged.add(keyframe, facts_);
     quality = judged.quality(facts_, options_.mapper.keyframe.planes,
-                             selectedCameras(mapper_.rig(), options_.mapper.cameras).size());
+                             selectedCameras(store_.mapper.rig(), options_.mapper.cameras).size());
   }
-  status_.silent_keyframes.resize(mapper_.rig().cameras.size());
+  status_.silent_keyframes.resize(store_.mapper.rig().cameras.size());
   const std::size_t kept = map_.trajectory.size();
   const std::size_t kept_keyframes = map_.keyframes.size();
   const std::size_t inserted = cloud_.T_world_ref().size();
@@ -433,9 +429,10 @@ std::shared_ptr<MapSnapshot> MappingSession::snapshot(bool with_points) {
 
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
-  status.held_events = mapper_.heldEvents();
+  status.held_events = store_.mapper.heldEvents();
+  status.events = store_.events;
   status.counts = earlier_counts_;
-  status.counts += mapper_.counts();
+  status.counts += store_.mapper.counts();
   LiveStatus& live = status.live.emplace(live_);
   for (const auto& [camera, events] : status.rejected_events) live.cameras[camera].lost += events;
   for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
@@ -443,7 +440,7 @@ SessionStatus MappingSession::status() const {
   }
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();
-  status.rig = mapper_.rig();
+  status.rig = store_.mapper.rig();
   status.silent_keyframes.resize(status.rig.cameras.size());
   status.quality.left_out = left_out_.size();
   if (refinement_) {

@@ -88,13 +88,36 @@ class MappingSession {
   /// Returns the options in use; those that are still to be chosen are `automatic`.
   const EventFusionOptions& options() const { return options_; }
   /// Returns the time until which the events of the selected cameras are complete.
-  std::int64_t eventsCompleteNs() const { return mapper_.eventsCompleteNs(); }
+  std::int64_t eventsCompleteNs() const { return store_.mapper.eventsCompleteNs(); }
 
  private:
+  /// The poses between two jumps.
+  struct Segment {
+    std::int64_t begin_ns = kEndOfTimeNs;  // kEndOfTimeNs before the first event
+    std::uint64_t keyframes = 0;           // number of keyframes before the segment
+    int too_short = 0;  // number of consecutive earlier segments without room for a window
+  };
+  /// What belongs to one clock. A clock reset replaces it as a whole.
+  struct EventStore {
+    explicit EventStore(const FusionMapperOptions& options) : mapper(options) {}
+
+    FusionMapper mapper;                          // held events, filters, poses
+    std::optional<TimeSpan> events;               // times on the clock of the poses
+    std::optional<std::int64_t> newest_begin_ns;  // of packets with events
+    std::optional<std::int64_t> newest_pose_ns;   // of the selected source
+    // Stated noise of the poses of each source, by the times of the poses.
+    std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises;
+    std::map<int, Missing> missing;  // by camera
+    Segment segment;
+    std::optional<std::int64_t> no_scene_since_ns;
+    std::size_t events_without_scene = 0;
+    std::int64_t look_again_ns = kMinTimeNs;  // the next choice is not before this time
+  };
+
   const DepthPlanesOptions& planes() const {
     return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
   }
-  bool hasCameras() const { return !mapper_.rig().cameras.empty(); }
+  bool hasCameras() const { return !store_.mapper.rig().cameras.empty(); }
   void addCameras(const Rig& rig);
   void addEvents(EventPacket packet);
   void addPose(const PoseSample& sample);
@@ -138,38 +161,23 @@ class MappingSession {
   AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
   EventFusionOptions options_;  // `automatic`: the options that are still to be chosen
   PoseSourceSelector pose_source_;
-  FusionMapper mapper_;
+  EventStore store_;
   MapperCounts earlier_counts_;  // counts of the mappers before clock resets
   bool waits_for_options_;
   std::optional<DepthFollower> depth_follower_;  // set if depth limits are automatic
-  std::optional<std::int64_t> no_scene_since_ns_;
-  std::size_t events_without_scene_ = 0;
-  std::int64_t look_again_ns_ = kMinTimeNs;  // the next choice is not before this time
   std::int64_t look_interval_ns_ = 0;
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // set if poses are refined
   MapSnapshot map_;  // without points; the poses are refined by `snapshot`
   QualityFacts facts_;
   QualityStatistics quality_;
-  std::size_t num_judged_ = 0;      // keyframes that are left out, or not
-  std::set<std::size_t> left_out_;  // keyframes without points in the cloud
-  // Stated noise of the poses of each source, by the times of the poses.
-  std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
+  std::size_t num_judged_ = 0;                           // keyframes that are left out, or not
+  std::set<std::size_t> left_out_;                       // keyframes without points in the cloud
   std::optional<std::variant<Jump, ClockReset>> break_;  // the input goes on behind it
-  std::map<int, Missing> missing_;                       // by camera
   LiveStatus live_;                                      // breaks, rejected poses
-  std::optional<std::int64_t> newest_pose_ns_;           // of the selected source
   bool finished_ = false;
   bool keyframe_lost_ = false;  // the last call of `next` made a keyframe and threw
   bool all_refined_ = false;
-  std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
-  /// The poses between two jumps.
-  struct Segment {
-    std::int64_t begin_ns = kEndOfTimeNs;  // kEndOfTimeNs before the first event
-    std::uint64_t keyframes = 0;           // number of keyframes before the segment
-    int too_short = 0;  // number of consecutive earlier segments without room for a window
-  };
-  Segment segment_;
   double reported_needed_ = 0;  // events of a reported window that was too large
   SessionStatus status_;        // incomplete: see status()
 };
