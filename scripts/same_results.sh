@@ -158,7 +158,7 @@ import sys
 WORK = pathlib.Path(sys.argv[1])
 VOLATILE = {"seconds", "cpu_seconds", "votes_per_second", "peak_memory_bytes", "version"}
 TIMES = re.compile(r"(?m)^time +[\d.]+ s for |; at most \d+ [MG]B of memory|(?<=; sweep )[\d.]+ s, depth [\d.]+ s, "
-                   r"refinement [\d.]+ s|^\[\d\d:\d\d:[\d.]+|^event-fusion: [a-z ]+\d+ %, .*$")
+                   r"(?:motion [\d.]+ s, )?refinement [\d.]+ s|^\[\d\d:\d\d:[\d.]+|^event-fusion: [a-z ]+\d+ %, .*$")
 EXPECTED_FAILURES = {"version"}  # one of its commands does not exist
 EMBEDDED = re.compile(r'(application/json">)(.*?)(</script>)', re.S)
 

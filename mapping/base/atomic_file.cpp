@@ -57,9 +57,27 @@ std::string reasonNotWritten(int error_number) {
   }
 }
 
+namespace {
+
+/// Returns a temporary name: "map.partial-1234.pcd" for "map.pcd" and process 1234. If that file
+/// exists, trial 1 gives "map.partial-1234-1.pcd", and so on. A killed process leaves its file.
+std::filesystem::path temporaryName(const std::filesystem::path& path, int trial) {
+  const std::string number =
+      std::to_string(getpid()) + (trial == 0 ? "" : "-" + std::to_string(trial));
+  const std::string end = ".partial-" + number + path.extension().string();
+  std::string begin = path.stem().string();
+  // Two long names may begin with the same characters: then `trial` makes them different.
+  begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
+  std::filesystem::path temporary = path;
+  temporary.replace_filename(begin + end);
+  return temporary;
+}
+
+}  // namespace
+
 AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(replaceableFile(path)) {
   for (int trial = 0;; ++trial) {
-    temporary_ = temporaryName(path_, getpid(), trial);
+    temporary_ = temporaryName(path_, trial);
     const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file >= 0) {
       ::close(file);
@@ -71,41 +89,33 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(replaceableFil
   }
 }
 
-std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& path, pid_t process,
-                                                int trial) {
-  const std::string number =
-      std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
-  const std::string end = ".partial-" + number + path.extension().string();
-  std::string begin = path.stem().string();
-  // Two long names may begin with the same characters: then `trial` makes them different.
-  begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
-  std::filesystem::path temporary = path;
-  temporary.replace_filename(begin + end);
-  return temporary;
-}
-
 AtomicFile::~AtomicFile() {
   std::error_code ignored;
   if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
 }
 
-void AtomicFile::fill(
-    const std::function<void(const std::filesystem::path& temporary)>& write) const {
+void fillFile(const std::filesystem::path& path, const std::filesystem::path& named,
+              const std::function<void(const std::filesystem::path& path)>& write) {
   errno = 0;
   try {
-    write(temporary_);
+    write(path);
   } catch (const std::exception& error) {
     const std::string why = reasonNotWritten(errno);
-    throw std::runtime_error("cannot write " + path_.string() + ": " +
+    throw std::runtime_error("cannot write " + named.string() + ": " +
                              (why.empty() ? error.what() : why));
   }
 }
 
-void AtomicFile::replace(DiskSync sync) {
-  if (sync == DiskSync::kNow) syncToDisk(temporary_);
+void AtomicFile::fill(
+    const std::function<void(const std::filesystem::path& temporary)>& write) const {
+  fillFile(temporary_, path_, write);
+}
+
+void AtomicFile::replace() {
+  syncToDisk(temporary_);
   std::filesystem::rename(temporary_, path_);
   temporary_.clear();  // from now on another process may use this name
-  if (sync == DiskSync::kNow) syncToDisk(path_.has_parent_path() ? path_.parent_path() : ".");
+  syncToDisk(path_.has_parent_path() ? path_.parent_path() : ".");
 }
 
 void syncToDisk(const std::filesystem::path& path) {
@@ -120,12 +130,11 @@ void syncToDisk(const std::filesystem::path& path) {
 }
 
 void writeAtomically(const std::filesystem::path& path,
-                     const std::function<void(const std::filesystem::path& temporary)>& write,
-                     DiskSync sync) {
+                     const std::function<void(const std::filesystem::path& temporary)>& write) {
   AtomicFile file(path);
   file.fill([&](const std::filesystem::path& temporary) {
     write(temporary);
-    file.replace(sync);
+    file.replace();
   });
 }
 

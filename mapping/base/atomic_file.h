@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <sys/types.h>
-
 #include <filesystem>
 #include <functional>
 #include <string>
 
 namespace efm {
 
-/// When a file is on the disk: as soon as it has its name, or when its writer calls `syncToDisk`.
-enum class DiskSync { kNow, kLater };
+/// Fills a file by a function, which receives its path.
+/// @param named in errors, if another file is meant.
+/// @throws std::runtime_error with the message of `write`, or that the disk is full.
+void fillFile(const std::filesystem::path& path, const std::filesystem::path& named,
+              const std::function<void(const std::filesystem::path& path)>& write);
 
 /// A file that appears under its name when it is complete and on the disk. Until then it has a
 /// temporary name in the same folder. A reader sees the complete file, the previous file or none,
@@ -26,22 +27,15 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Returns a temporary name: "map.partial-1234.pcd" for "map.pcd" and process 1234. If that file
-  /// exists, trial 1 gives "map.partial-1234-1.pcd", and so on. A killed process leaves its file.
-  static std::filesystem::path temporaryName(const std::filesystem::path& path, pid_t process,
-                                             int trial);
-
   /// Returns the path of the file that `replace` creates or replaces.
   const std::filesystem::path& path() const { return path_; }
   /// Returns the path of the file to write: empty at first, with the extension of `path`.
   const std::filesystem::path& temporary() const { return temporary_; }
-  /// @param write fills the file at the path that it receives.
-  /// @throws std::runtime_error naming `path`. It has the message of `write`, or says that the disk
-  /// is full.
+  /// Fills the temporary file; errors name `path`: see `fillFile`.
   void fill(const std::function<void(const std::filesystem::path& temporary)>& write) const;
-  /// Renames the complete temporary file to `path`. With `kNow` it is flushed to the disk first.
+  /// Flushes the complete temporary file to the disk, and renames it to `path`.
   /// @throws std::filesystem::filesystem_error.
-  void replace(DiskSync sync = DiskSync::kNow);
+  void replace();
 
  private:
   std::filesystem::path path_;
@@ -53,8 +47,7 @@ class AtomicFile {
 /// @throws std::runtime_error naming `path` if the file cannot be written or renamed. It has the
 /// message of `write`, or says that the disk is full.
 void writeAtomically(const std::filesystem::path& path,
-                     const std::function<void(const std::filesystem::path& temporary)>& write,
-                     DiskSync sync = DiskSync::kNow);
+                     const std::function<void(const std::filesystem::path& temporary)>& write);
 
 /// Waits until a file, or the names of the files in a folder, are on the disk. Does nothing if the
 /// file system cannot flush, or if the path cannot be opened for reading.

@@ -34,8 +34,8 @@ double processSeconds();
 double threadSeconds();
 double asideSeconds();
 
-/// Marks the current thread, which must also destroy this object: its processor time does not count
-/// for the stages of others.
+/// While it exists, the current thread's processor time does not count for the stages of others.
+/// Make it first in a thread, and destroy it there: the thread's whole time counts as aside.
 class WorkAside {
  public:
   WorkAside();

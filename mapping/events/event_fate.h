@@ -51,8 +51,8 @@ enum class EventFate {
   kUsed,           ///< The event voted in at least one keyframe.
   kWithoutPose,    ///< The trajectory has no pose at its time.
   kOutsideWindow,  ///< The event is in no window that was mapped.
-  kLate,           ///< The event came after its window was mapped.
-  kDropped,        ///< Every window of the event was dropped.
+  kLate,           ///< The event came after its windows were mapped.
+  kDropped,        ///< In dropped windows, or late and before the end of a dropped window.
   kUnselected,     ///< From a camera that is not selected.
   kFiltered,       ///< Removed as noise, with or without a pose.
   kOutsideLens,    ///< The lens model has no viewing ray for its pixel (`LensInverse`).

@@ -104,8 +104,9 @@ class FusionMapper : private RecordingProgress {
   /// @return whether there was such a window. If not, the next call of `next` tries again.
   bool dropFailedWindow();
   /// Drops the windows that begin before a time, with or without data, and releases the events
-  /// before that time. Such an event that comes later counts as dropped. The events of these
-  /// windows count as dropped too, unless another window uses them or the reason is `kPaused`.
+  /// before that time. Such an event that comes later counts as dropped (as late for `kPaused`).
+  /// The events of these windows count as dropped too, unless another window uses them or the
+  /// reason is `kPaused`.
   void dropWindowsBefore(std::int64_t t_ns, DropReason reason);
   /// Calls `dropWindowsBefore` for the time right after all events so far.
   void dropAllWindows(DropReason reason) { dropWindowsBefore(reachedNs() + 1, reason); }

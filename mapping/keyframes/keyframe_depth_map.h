@@ -45,7 +45,7 @@ struct KeyframeDepthMap {
   Rigid3 T_world_ref;  ///< Pose of the reference view.
   Rigid3 T_rig_ref;    ///< The same, on the rig.
   ReferenceView view;
-  DepthPlanesOptions planes;
+  DepthPlanesOptions planes;  ///< The keyframe was made with them.
   DepthMap map;
   /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
   double parallax_px_m = 0;

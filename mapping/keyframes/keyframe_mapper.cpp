@@ -222,7 +222,7 @@ KeyframeDepthMap KeyframeMapper::mapBest(const WindowInput& input, const Traject
 /// correction is from the depth of the window's central part.
 /// @param central_depth of that part, along the tracker's motion.
 /// @param sink receives only the DSI of the result.
-/// @param finest_px in and out: see AlignedMotion.
+/// @param finest_px is set by each alignment: see AlignedMotion.
 KeyframeDepthMap KeyframeMapper::mapSharpest(const WindowInput& input, const Trajectory& tracked,
                                              const cv::Mat1f& central_depth, DsiSink* sink,
                                              StageTimes* times, double& finest_px) const {

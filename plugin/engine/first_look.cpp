@@ -194,7 +194,10 @@ PoseVerdict judgePoses(const RecordingSurvey& survey, const FusionMapperOptions&
 Chosen chooseAndJudge(const RecordingSurvey& survey, const EventFusionOptions& options) {
   Chosen chosen = choose(survey, options);
   if (options.checks) chosen.verdict = judgePoses(survey, chosen.mapper);
-  chosen.verdict.applyTo(chosen.mapper);
+  MotionCorrectionUse& use = chosen.mapper.keyframe.motion.correct_motion;
+  if (chosen.verdict.keep_motion && use == MotionCorrectionUse::kAuto) {
+    use = MotionCorrectionUse::kNever;
+  }
   return chosen;
 }
 

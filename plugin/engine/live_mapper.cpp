@@ -243,10 +243,12 @@ bool LiveMapper::attempt(Fault fault, const char* doing, const Step& step) {
   try {
     step();
     return true;
-  } catch (...) {
+  } catch (const std::invalid_argument&) {
     noteError(doing, fault);
-    return false;
+  } catch (...) {  // no rejected input
+    noteError(doing, fault == Fault::kCallback ? fault : Fault::kMapping);
   }
+  return false;
 }
 
 /// Calls the host without a lock that another thread needs.

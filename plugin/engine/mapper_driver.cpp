@@ -223,6 +223,7 @@ std::vector<std::string> MapperDriver::warningsOfSilence(const KeyframeDepthMap&
 
 MapperDriver::News MapperDriver::takeNews() {
   News news;
+  if (std::exchange(told_news_, session_.news()) == session_.news()) return news;
   SessionStatus status = session_.status();
   const bool is_first_blur = status.counts.motion.corrected > 0 && !std::exchange(blur_told_, true);
   if (is_first_blur) {

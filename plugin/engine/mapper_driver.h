@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -15,8 +13,6 @@
 #include <vector>
 
 #include "event_fusion/engine.h"
-#include "maps/cloud/keyframe_cloud.h"
-#include "maps/cloud/map_point.h"
 #include "plugin/checks/health_checks.h"
 #include "plugin/checks/recording_statistics.h"
 #include "plugin/recordings/streams/sample.h"
@@ -26,7 +22,8 @@ namespace efm {
 
 /// What is behind a Mapper: a session, its results so far, and the host's callbacks. PlaybackMapper
 /// maps in the caller's thread, LiveMapper in a thread of its own. Functions without a comment are
-/// those of Mapper. If the keyframe cannot be stored, its window is dropped.
+/// those of Mapper. If a keyframe cannot be added to the map, its window
+/// counts as dropped.
 class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
  public:
   using Callbacks = Mapper::Callbacks;
@@ -37,8 +34,8 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   static std::shared_ptr<MapperDriver> make(const EventFusionOptions& options, Callbacks callbacks,
                                             const std::vector<StoredKeyframe>& earlier = {},
                                             QualityFacts facts = {});
-  /// Makes the driver of a host other than the program: errors, the log and the status have
-  /// hostText.
+  /// Makes the driver of a host other than the program: errors of this call and the log have
+  /// hostText. The host wraps its other calls in `efm::forHost`, and calls `statusForHost`.
   static std::shared_ptr<MapperDriver> forHost(const EventFusionOptions& options,
                                                Callbacks callbacks,
                                                const std::vector<StoredKeyframe>& earlier);
@@ -56,6 +53,10 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   virtual void skip(int camera, const std::vector<Event>& events) = 0;
   virtual void finish() = 0;
   virtual void stop() = 0;
+  /// In playback: `add` and `finish` only take the input from now on; `next` maps it.
+  virtual void pullKeyframes() {}
+  /// Maps the next complete window in playback, without callbacks of keyframes. std::nullopt: none.
+  virtual std::optional<KeyframeDepthMap> next() { return std::nullopt; }
   /// Returns whether the caller is in the mapper's own thread: in a callback of live operation.
   virtual bool runsHere() const { return false; }
   /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
@@ -124,7 +125,7 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   void fixRig(const Rig& given);
 
   std::set<int> silent_cameras_;  // cameras without events that were logged
-  std::uint64_t told_choices_ = 0;
+  std::uint64_t told_news_ = 0, told_choices_ = 0;
   bool blur_told_ = false;
 
   // Under copies_mutex_.

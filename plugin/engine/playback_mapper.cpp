@@ -148,19 +148,24 @@ void PlaybackMapper::work(std::vector<Input> inputs, bool ends) {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
     if (finished_ && !ends) throw std::logic_error("input after the end: `finish` was called");
     for (Input& input : inputs) {
-      lookAt(input);
-      error.attempt([&] { feed(std::move(input)); });
+      error.attempt([&] {
+        lookAt(input);
+        feed(std::move(input));
+      });
     }
     if (ends && !std::exchange(finished_, true)) error.attempt([&] { session_.finish(); });
   }
-  while (mapNext(error)) {  // earlier samples are mapped even if one is rejected
+  while (!pulled_) {  // earlier samples are mapped even if one is rejected
+    const std::optional<KeyframeDepthMap> keyframe = mapNext(error);
+    if (!keyframe) break;
+    if (callbacks_.on_keyframe) callBack(error, [&] { callbacks_.on_keyframe(*keyframe); });
   }
   error.rethrow();
 }
 
 /// Shows input to the first look. Input that it rejects is rejected by the session, too.
 void PlaybackMapper::lookAt(const Input& input) {
-  if (!look_) return;
+  if (!look_ || survey_) return;
   if (const auto* const rig = std::get_if<Rig>(&input)) look_->take(*rig);
   look_ends_ |= std::holds_alternative<Missing>(input);
   try {
@@ -178,7 +183,8 @@ void PlaybackMapper::chooseIfDue() {
   const bool ends = look_ends_ && status.events &&
                     secondsBetween(status.events->first_ns, status.events->last_ns) > kFirstWindowS;
   if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return;
-  RecordingSurvey survey = std::exchange(look_, nullptr)->finish();
+  if (!survey_) survey_ = look_->finish();
+  RecordingSurvey survey = *survey_;
   const double seen_s = survey.duration_s.value_or(0);
   if (!finished_) survey.duration_s.reset();
   const EventFusionOptions& options = session_.options();
@@ -193,17 +199,26 @@ void PlaybackMapper::chooseIfDue() {
     }
   }
   feed(std::move(found));
+  survey_.reset();
+  look_.reset();
 }
 
-/// @return true if it made a keyframe.
-bool PlaybackMapper::mapNext(FirstError& error) {
+std::optional<KeyframeDepthMap> PlaybackMapper::next() {
+  FirstError error;
+  std::optional<KeyframeDepthMap> keyframe = mapNext(error);
+  error.rethrow();
+  return keyframe;
+}
+
+/// Maps the next window, and tells the log.
+std::optional<KeyframeDepthMap> PlaybackMapper::mapNext(FirstError& error) {
   std::optional<KeyframeDepthMap> keyframe;
   std::vector<std::string> warnings;
   News news;
   {
     const std::lock_guard<TurnMutex> lock(session_mutex_);
     // Within a callback, the caller of the callback maps.
-    if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
+    if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
     error.attempt([&] {
       chooseIfDue();
       keyframe = mapWindow();
@@ -214,10 +229,7 @@ bool PlaybackMapper::mapNext(FirstError& error) {
   const Say say = sayer(error);
   tell(news, say);
   for (const std::string& text : warnings) say(callbacks_.warn, text);
-  if (keyframe && callbacks_.on_keyframe) {
-    callBack(error, [&] { callbacks_.on_keyframe(*keyframe); });
-  }
-  return keyframe.has_value();
+  return keyframe;
 }
 
 MapperDriver::Say PlaybackMapper::sayer(FirstError& error) {

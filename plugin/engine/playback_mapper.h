@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mapping/events/event_checker.h"
+#include "plugin/engine/first_look.h"
 #include "plugin/engine/mapper_driver.h"
 #include "plugin/session/pose_intake.h"
 
@@ -59,6 +60,8 @@ class PlaybackMapper : public MapperDriver {
   void skip(int camera, const std::vector<Event>& events) override;
   void finish() override;
   void stop() override;
+  void pullKeyframes() override { pulled_ = true; }
+  std::optional<KeyframeDepthMap> next() override;
   SessionStatus status() const override;
   std::shared_ptr<const MapSnapshot> newest(bool with_points) override;
   EventFusionOptions usedOptions() const override;
@@ -79,7 +82,7 @@ class PlaybackMapper : public MapperDriver {
   void work(std::vector<Input> inputs, bool ends = false);
   void lookAt(const Input& input);
   void chooseIfDue();
-  bool mapNext(FirstError& error);
+  std::optional<KeyframeDepthMap> mapNext(FirstError& error);
   Say sayer(FirstError& error);
   template <typename Call>
   void callBack(FirstError& error, const Call& call);
@@ -89,12 +92,14 @@ class PlaybackMapper : public MapperDriver {
   PoseIntake pose_intake_;
   std::optional<TimeSpan> pose_times_;  // which confirm events
 
+  std::atomic<bool> pulled_ = false;
   std::atomic<bool> stopped_ = false;
   std::atomic<bool> ended_ = false;
   // Guards the session and the members below. It is held while a keyframe is made.
   mutable TurnMutex session_mutex_;
-  std::unique_ptr<FirstLook> look_;  // until the automatic options are chosen
-  bool look_ends_ = false;           // with the next data: events are missing
+  std::unique_ptr<FirstLook> look_;        // until the automatic options are chosen
+  std::optional<RecordingSurvey> survey_;  // the result of look_
+  bool look_ends_ = false;  // events are missing: choose as soon as the data last a second
   std::map<int, std::uint64_t> paused_events_;
   std::set<std::thread::id> delivering_;  // threads that are in a callback
   bool finished_ = false;

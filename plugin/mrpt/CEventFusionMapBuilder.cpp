@@ -164,7 +164,7 @@ void CEventFusionMapBuilder::take(const mrpt::obs::CObservation::Ptr& observatio
 void CEventFusionMapBuilder::finish() {
   std::exception_ptr error;  // of cameras that never came: the others are mapped all the same
   try {
-    packets()->finish();
+    forHost(HostFace::kMapper, [&] { packets()->finish(); });
   } catch (const std::invalid_argument&) {
     error = std::current_exception();
   }

@@ -193,7 +193,7 @@ Look lookAt(Job& job) {
   }
   append(job.report.warnings, std::move(verdict.warnings));
   warnOfNew(job);
-  job.report.notes = source.counts().notes;  // the quality says what could not be checked
+  job.report.notes = source.counts().notes;  // not verdict.notes: the quality says them
   for (const Warning& note : job.report.notes) {
     if (job.note) job.note(note.name + ": " + note.text);
   }
@@ -218,6 +218,16 @@ MappingRun::Host hostOf(const Job& job, const char* activity) {
   return host;
 }
 
+/// Returns a host whose run is no result if it is stopped.
+MappingRun::Host interruptible(const Job& job, const char* activity) {
+  MappingRun::Host host = hostOf(job, activity);
+  host.stop = [&job] {
+    requireNoStop(job);
+    return false;
+  };
+  return host;
+}
+
 /// Passes over the recording for max_confidence = sequence: the robust maximum of the keyframes'
 /// confidences. It costs as much as the mapping. @return std::nullopt if there is no keyframe.
 std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
@@ -228,9 +238,8 @@ std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
   RobustMaximum maximum;
   const std::unique_ptr<Recording> all = openRecording(job.sourceNow());
   MappingRun pass(*all, of_pass, first, std::min(job.verbosity, Verbosity::kNormal),
-                  hostOf(job, "first pass"), "first pass");
+                  interruptible(job, "first pass"), "first pass");
   while (const auto keyframe = pass.next()) maximum.add(keyframe->max_confidence);
-  if (pass.stopped()) throw Interrupted();
   return maximum.value();  // the mapping reports an error
 }
 
@@ -248,10 +257,11 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   }
   requireNoStop(job);
   if (job.out.empty()) return look;
-  folder.emplace(job.out);
+  folder.emplace(job.out, kind);
   if (folder->left().empty()) return look;
   addWarning(job.report.warnings, "left-result",
-             "a run that did not end left {} keyframes: they are in {} until this result is whole",
+             "a run was killed: its {} keyframes are in {}; they are removed when this result is "
+             "complete",
              countKeyframes(folder->left()), folder->left().string());
   warnOfNew(job);
   return look;
@@ -305,24 +315,24 @@ MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<con
               std::optional<UserError> error) {
   MapReport& report = job.report;
   report.peak_memory_bytes = peakMemoryBytes();
-  if (!error) error = job.write_error;
   bool keeps_earlier = false;
   if (folder) {
-    keeps_earlier = folder->hasEarlier() && (report.counts.keyframes == 0 || job.write_error);
-    if (keeps_earlier) {
-      const std::string stays = folder->abandon();
-      if (job.write_error) error->add(stays);
-    }
-    if (!keeps_earlier) {
+    const bool has_earlier = folder->hasEarlier();
+    keeps_earlier = has_earlier && report.counts.keyframes == 0;
+    if (!keeps_earlier && !job.write_error) {
       write(job, [&] {
         outputOf(job, *folder).writeText("report.json", [&](std::ostream& file) {
           file << reportJson(report);
         });
         folder->commit();
       });
-      if (!error) error = job.write_error;
+    }
+    if (job.write_error) {
+      job.write_error->add(folder->abandon());
+      keeps_earlier = has_earlier;
     }
   }
+  if (!error) error = job.write_error;
   warnOfNew(job);
   return {std::move(report), std::move(map), std::move(error), keeps_earlier};
 }
@@ -337,6 +347,9 @@ MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<con
     const std::string stays = folder ? folder->abandon() : std::string();
     if (stays.empty()) throw;
     throw std::runtime_error(userMessage(error) + stays);
+  } catch (...) {
+    if (folder) folder->abandon();
+    throw;
   }
 }
 
@@ -500,17 +513,14 @@ MapResult mapWindowInto(MapJob given) {
           mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
     });
     DsiReceiver dsi(job, look.recording->rig(), folder);  // outlives the run
-    bool made = false;
-    MappingRun::Host host = hostOf(job, "mapping");
-    host.stop = [&] { return !made && job.stop && job.stop(); };
+    MappingRun::Host host = interruptible(job, "mapping");
     if (dsi.receives()) host.sink = &dsi;
     MappingRun run(*look.recording, options, std::move(look.first), job.verbosity, host);
     while (const auto keyframe = run.next()) {
-      made = true;
+      job.stop = {};  // the window has its keyframe
       writer.add(*keyframe);
       if (job.on_keyframe) job.on_keyframe(*keyframe, run);
     }
-    if (run.stopped()) throw Interrupted();  // without its keyframe, a window has no result
     writer.finish();
 
     const auto map = run.map();
@@ -518,8 +528,9 @@ MapResult mapWindowInto(MapJob given) {
     describePoints(points ? *points : *map->points, job.report);
     if (points && folder) {
       write(job, [&] { outputOf(job, *folder).writeCloud("points.pcd", *points); });
-      if (dsi.file()) write(job, [&] { dsi.file()->finish(); });
     }
+    if (dsi.file()) write(job, [&] { dsi.file()->finish(); });
+    if (dsi.file() && !points) std::filesystem::remove(folder->path() / "dsi.npy");  // no plane
     judgePoints(job.report, *map->points);
     endTimes(job);
     return end(job, folder, map, run.error());

@@ -26,15 +26,18 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
   options.validate();
   first_.statistics.setWindow(statisticsOptions(options).window_s);
   Mapper::Callbacks callbacks;  // other messages are summarised in the warnings
-  callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
-    const std::lock_guard<std::mutex> lock(made_mutex_);
-    made_.push_back(keyframe);
-  };
+  if (options.live.enabled) {
+    callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
+      const std::lock_guard<std::mutex> lock(made_mutex_);
+      made_.push_back(keyframe);
+    };
+  }
   EventFusionOptions of_rig = options;
   of_rig.rig = {};  // the recording has its files
   of_rig.rig.pose_source = options.rig.pose_source;
   mapper_ = MapperDriver::make(of_rig, std::move(callbacks), {}, first_.quality);
   mapper_->setSink(host_.sink);
+  mapper_->pullKeyframes();
   attempt([this] { mapper_->addCameras(recording_.rig()); }, true);
 }
 
@@ -57,21 +60,27 @@ bool MappingRun::attempt(const Step& step, bool is_input) {
 }
 
 std::optional<KeyframeDepthMap> MappingRun::next() {
-  auto made = takeMade();
-  while (!made && !ended_) {
+  while (true) {
+    std::optional<KeyframeDepthMap> made;
+    const bool maps = attempt([&] { made = options_.live.enabled ? takeMade() : mapper_->next(); });
+    if (made) {
+      depths_.add(*made);
+      if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(*made));
+      return made;
+    }
+    if (ended_) return std::nullopt;
     stopped_ = host_.stop && host_.stop();
-    ended_ = stopped_ || !feedNext();
-    if (ended_) attempt([this] { mapper_->finish(); });
-    if (!ended_ && progress_.due()) showProgress();
-    if (!ended_ && host_.on_progress) host_.on_progress(fraction());
-    made = takeMade();
+    ended_ = !maps || stopped_ || !feedNext();
+    if (ended_) {
+      attempt([this] { mapper_->finish(); });
+      continue;
+    }
+    if (progress_.due()) showProgress();
+    if (host_.on_progress) host_.on_progress(fraction());
   }
-  if (!made) return made;
-  depths_.add(*made);
-  if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(*made));
-  return made;
 }
 
+/// Takes the first keyframe that waits, in live operation.
 std::optional<KeyframeDepthMap> MappingRun::takeMade() {
   const std::lock_guard<std::mutex> lock(made_mutex_);
   if (made_.empty()) return std::nullopt;
@@ -165,12 +174,12 @@ std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
   std::optional<std::int64_t> start_ns;
   if (status.events) start_ns = status.events->first_ns;
   return fmt::format(
-      "keyframe {} at {}: {} events, {} depths; sweep {:.3f} s, depth {:.3f} s, refinement "
-      "{:.3f} s",
+      "keyframe {} at {}: {} events, {} depths; sweep {:.3f} s, depth {:.3f} s, motion {:.3f} s, "
+      "refinement {:.3f} s",
       ++returned_, timeText(keyframe.window.t_ref_ns, start_ns),
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), std::uint64_t{0}),
       cv::countNonZero(keyframe.map.depth), now.rays + now.sweep - before.rays - before.sweep,
-      now.depth - before.depth, now.refine - before.refine);
+      now.depth - before.depth, now.motion - before.motion, now.refine - before.refine);
 }
 
 namespace {

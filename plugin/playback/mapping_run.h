@@ -37,7 +37,8 @@ struct FirstPass {
 class MappingRun {
  public:
   struct Host {
-    std::function<bool()> stop;  ///< Returns whether the recording is to end here; may be empty.
+    /// Returns whether the recording is to end here. May be empty; its exceptions end the run.
+    std::function<bool()> stop;
     std::function<void(double fraction)> on_progress;  ///< Called after each sample; may be empty.
     DsiSink* sink = nullptr;                           ///< Receives every fused plane; may be null.
   };
@@ -52,7 +53,6 @@ class MappingRun {
   /// @return std::nullopt at the end, after an error, or if the host stopped.
   std::optional<KeyframeDepthMap> next();
 
-  bool stopped() const { return stopped_; }
   /// Returns the map so far.
   std::shared_ptr<const MapSnapshot> map() const { return mapper_->newest(true); }
   /// Returns the map so far, for watchers.
@@ -86,8 +86,8 @@ class MappingRun {
   std::optional<UserError> error_;
   bool stopped_ = false;
   bool ended_ = false;
-  std::mutex made_mutex_;  // guards made_: in live operation the mapper has a thread of its own
-  std::deque<KeyframeDepthMap> made_;     // not returned yet
+  std::mutex made_mutex_;                 // guards made_
+  std::deque<KeyframeDepthMap> made_;     // in live operation: not returned yet
   std::optional<std::int64_t> first_ns_;  // in live operation: time of the first sample
   std::chrono::steady_clock::time_point began_;
   std::uint64_t returned_ = 0;  // keyframes

@@ -8,11 +8,6 @@
 
 namespace efm {
 
-void PoseVerdict::applyTo(FusionMapperOptions& options) const {
-  MotionCorrectionUse& use = options.keyframe.motion.correct_motion;
-  if (keep_motion && use == MotionCorrectionUse::kAuto) use = MotionCorrectionUse::kNever;
-}
-
 Chosen choose(const RecordingSurvey& survey, const EventFusionOptions& options) {
   Chosen chosen{options.mapper, {}, {}};
   if (options.automatic.any()) {

@@ -20,9 +20,6 @@ struct PoseVerdict {
   /// True if the calibration between cameras is wrong. A correction of the motion would then hide
   /// it, and make the map worse.
   bool keep_motion = false;
-
-  /// Switches the automatic correction of the motion off, if the motion is to be kept.
-  void applyTo(FusionMapperOptions& options) const;
 };
 
 /// Returns the events per second of all cameras together.

@@ -94,9 +94,9 @@ void MappingSession::feed(EventPacket packet) {
 
 void MappingSession::addPose(const PoseSample& sample) {
   const PoseSourceId& source = sample.source;
-  for (const StampedPose& pose : pose_source_.add(source, {sample.t_ns, sample.T_world_rig()})) {
-    usePose(pose);
-  }
+  const std::exception_ptr error =
+      usePoses(pose_source_.add(source, {sample.t_ns, sample.T_world_rig()}));
+  if (error) std::rethrow_exception(error);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // If two poses have the same time, the first one is used, and so is its noise.
   if (refinement_ && used) store_.noises[source].try_emplace(sample.t_ns, sample.noise);
@@ -112,29 +112,27 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   return noises.begin()->second;
 }
 
-void MappingSession::usePose(const StampedPose& pose) {
-  try {
-    store_.mapper.addPose(pose);
-  } catch (const std::invalid_argument&) {
-    ++live_.rejected_poses;
-    throw;
-  }
-  extend(status_.poses, pose.t_ns);
-  store_.newest_pose_ns = std::max(store_.newest_pose_ns.value_or(pose.t_ns), pose.t_ns);
-}
-
-/// Selects a source of poses, if there is none yet, and uses its waiting poses, also after a
-/// rejected pose. Throws the first error at the end.
-void MappingSession::useSelected() {
+/// Uses poses, also after a rejected one. @return the first error.
+std::exception_ptr MappingSession::usePoses(const std::vector<StampedPose>& poses) {
   std::exception_ptr error;
-  for (const StampedPose& pose : pose_source_.select()) {
+  for (const StampedPose& pose : poses) {
     try {
-      usePose(pose);
+      store_.mapper.addPose(pose);
+      extend(status_.poses, pose.t_ns);
+      store_.newest_pose_ns = std::max(store_.newest_pose_ns.value_or(pose.t_ns), pose.t_ns);
     } catch (const std::invalid_argument&) {
+      ++live_.rejected_poses;
       if (!error) error = std::current_exception();
     }
   }
-  if (error) std::rethrow_exception(error);
+  return error;
+}
+
+/// Selects a source of poses, if there is none yet, and uses its waiting poses. `finish` throws
+/// their first error.
+void MappingSession::useSelected() {
+  const std::exception_ptr error = usePoses(pose_source_.select());
+  if (!waiting_error_) waiting_error_ = error;
 }
 
 void MappingSession::noteMissing(const Missing& missing) {
@@ -177,15 +175,15 @@ void MappingSession::dropOverdue(std::int64_t newest_begin_ns) {
 /// been mapped. @return whether there was one.
 bool MappingSession::endPiece() {
   if (!break_) return false;
-  const auto ended = *std::exchange(break_, std::nullopt);
-  if (const auto* jump = std::get_if<Jump>(&ended)) {
-    ++live_.pose_jumps;
+  if (const auto* jump = std::get_if<Jump>(&*break_)) {
     store_.mapper.dropWindowsBefore(jump->after_ns, DropReason::kJump);
     fitIntoSegments(jump->after_ns);
+    ++live_.pose_jumps;
   } else {
-    ++live_.clock_resets;
     restartMapper();
+    ++live_.clock_resets;
   }
+  break_.reset();
   return true;
 }
 
@@ -207,6 +205,7 @@ void MappingSession::finish() {
   store_.missing.clear();
   store_.mapper.finish();
   useSelected();
+  if (waiting_error_) std::rethrow_exception(std::exchange(waiting_error_, nullptr));
 }
 
 void MappingSession::limitWaits() {

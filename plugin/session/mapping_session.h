@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,8 +24,8 @@
 
 namespace efm {
 
-/// Who chooses automatic options: the session, as soon as its data show the scene, or its caller by
-/// NewOptions. Until then the session only stores.
+/// Who chooses automatic options. kSession: the session, as soon as its data show the scene.
+/// kCaller: the caller, by NewOptions; until then the session only stores.
 enum class ChoiceBy { kSession, kCaller };
 
 /// Turns packets of events and poses, in the order of time, into keyframes and the global cloud:
@@ -54,7 +55,8 @@ class MappingSession {
   /// @throws std::invalid_argument if a packet is older than earlier packets of its camera, or a
   /// pose is not valid or over a second older than another one.
   void add(Input input);
-  /// Ends the input.
+  /// Ends the input. @throws the first error of a pose that waited for its source: it is rejected,
+  /// the others are used.
   void finish();
 
   /// Maps the next complete window, if there is one, and inserts it into the cloud. By option, the
@@ -87,6 +89,12 @@ class MappingSession {
   SessionStatus status() const;
   /// Returns the options in use; those that are still to be chosen are `automatic`.
   const EventFusionOptions& options() const { return options_; }
+  /// Returns a number that grows when options are chosen, and when the motion of the first keyframe
+  /// is corrected.
+  std::uint64_t news() const {
+    const bool corrects = earlier_counts_.motion.corrected + store_.mapper.correctedKeyframes() > 0;
+    return status_.choices + (corrects ? 1 : 0);
+  }
   /// Returns the time until which the events of the selected cameras are complete.
   std::int64_t eventsCompleteNs() const { return store_.mapper.eventsCompleteNs(); }
 
@@ -126,7 +134,7 @@ class MappingSession {
   void dropMissing(int camera, std::int64_t next_ns);
   void dropOverdue(std::int64_t newest_begin_ns);
   void feed(EventPacket packet);
-  void usePose(const StampedPose& pose);
+  std::exception_ptr usePoses(const std::vector<StampedPose>& poses);
   void useSelected();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   // A piece of the input has one clock, and no jump of the tracker.
@@ -178,8 +186,9 @@ class MappingSession {
   bool finished_ = false;
   bool keyframe_lost_ = false;  // the last call of `next` made a keyframe and threw
   bool all_refined_ = false;
-  double reported_needed_ = 0;  // events of a reported window that was too large
-  SessionStatus status_;        // incomplete: see status()
+  std::exception_ptr waiting_error_;  // the first of poses that waited for their source
+  double reported_needed_ = 0;        // events of a reported window that was too large
+  SessionStatus status_;              // incomplete: see status()
 };
 
 }  // namespace efm

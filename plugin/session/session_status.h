@@ -121,7 +121,7 @@ struct SessionStatus {
   std::vector<Warning> pose_notes;            ///< What the first look could not check.
   MapQuality quality;                         ///< How good the map so far is.
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
-  std::optional<LiveStatus> live{};           ///< Set in live operation.
+  std::optional<LiveStatus> live{};           ///< In live operation (a session sets it always).
 };
 
 /// Returns the automatic options and their reasons, for a log.

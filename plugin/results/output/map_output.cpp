@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/results/output/map_output.h"
 
-#include <cerrno>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
@@ -31,19 +30,15 @@ std::function<void(const std::filesystem::path&)> byStream(
   };
 }
 
-/// Writes a file. @throws std::runtime_error naming it, with the message of `fill`, or that the
-/// disk is full.
+/// Writes a file. After an error it is not there.
 void write(const std::filesystem::path& path,
            const std::function<void(const std::filesystem::path&)>& fill) {
-  errno = 0;
   try {
-    fill(path);
-  } catch (const std::exception& error) {
-    const std::string why = reasonNotWritten(errno);
+    fillFile(path, path, fill);
+  } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
-    throw std::runtime_error("cannot write " + path.string() + ": " +
-                             (why.empty() ? error.what() : why));
+    throw;
   }
 }
 
@@ -134,10 +129,8 @@ void MapOutput::writeText(const std::string& name,
 void writePly(const std::filesystem::path& file, const MapCloud& cloud,
               const std::vector<StampedPose>& views) {
   const std::vector<PointColour> colours = coloursByHeight(cloud, Eigen::Vector3d::UnitZ());
-  AtomicFile atomic(file);
-  byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours, views); })(
-      atomic.temporary());
-  atomic.replace();
+  writeAtomically(
+      file, byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours, views); }));
 }
 
 }  // namespace efm

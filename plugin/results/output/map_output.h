@@ -10,7 +10,7 @@
 
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/trajectory.h"
-#include "mapping/keyframes/keyframe_mapper.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/map_point.h"
 
 namespace efm {

@@ -53,14 +53,21 @@ bool isKeyframeFolder(const std::string& name) {
   return t_ns && formatSeconds(*t_ns) == name;
 }
 
+/// The kinds of results whose files are meant.
+struct Kinds {
+  bool map = true;
+  bool depth = true;
+};
+
 /// The folders of a result, by what they may hold.
 enum class Level { kResult, kKeyframes, kKeyframe, kCamera };
 
-bool isFileOf(Level level, const std::string& name) {
+bool isFileOf(Level level, const std::string& name, Kinds kinds) {
   switch (level) {
     case Level::kResult:
-      return isIn(kMapFiles, name) || isIn(kDepthFiles, name) || isIn(kImages, name) ||
-             name == kReport || name == kLock;
+      return (kinds.map && isIn(kMapFiles, name)) ||
+             (kinds.depth && (isIn(kDepthFiles, name) || isIn(kImages, name))) || name == kReport ||
+             name == kLock;
     case Level::kKeyframes:
       return false;
     case Level::kKeyframe:
@@ -71,10 +78,10 @@ bool isFileOf(Level level, const std::string& name) {
   return false;
 }
 
-std::optional<Level> folderOf(Level level, const std::string& name) {
-  if (level == Level::kResult && name == kKeyframes) return Level::kKeyframes;
+std::optional<Level> folderOf(Level level, const std::string& name, Kinds kinds) {
+  if (level == Level::kResult && kinds.map && name == kKeyframes) return Level::kKeyframes;
   if (level == Level::kKeyframes && isKeyframeFolder(name)) return Level::kKeyframe;
-  const bool has_cameras = level == Level::kResult || level == Level::kKeyframe;
+  const bool has_cameras = level == Level::kKeyframe || (level == Level::kResult && kinds.depth);
   if (has_cameras && isCameraFolder(name)) return Level::kCamera;
   return std::nullopt;
 }
@@ -83,31 +90,38 @@ std::optional<Level> folderOf(Level level, const std::string& name) {
 struct ResultFiles {
   std::vector<fs::path> files;    // the report last
   std::vector<fs::path> folders;  // those within others first
-  bool all = true;                // nothing else is there
+  std::vector<fs::path> others;   // what does not belong to it
 };
 
-void collect(const fs::path& folder, const fs::path& below, Level level, ResultFiles& found) {
+void collect(const fs::path& folder, const fs::path& below, Level level, Kinds kinds,
+             ResultFiles& found) {
   for (const auto& entry : fs::directory_iterator(folder / below)) {
     const std::string name = entry.path().filename().string();
     const fs::file_status status = entry.symlink_status();
-    if (fs::is_regular_file(status) && isFileOf(level, name)) {
+    if (fs::is_regular_file(status) && isFileOf(level, name, kinds)) {
       found.files.push_back(below / name);
-    } else if (const auto inner = folderOf(level, name); inner && fs::is_directory(status)) {
-      collect(folder, below / name, *inner, found);
+    } else if (const auto inner = folderOf(level, name, kinds); inner && fs::is_directory(status)) {
+      collect(folder, below / name, *inner, kinds, found);
       found.folders.push_back(below / name);
     } else {
-      found.all = false;
+      found.others.push_back(below / name);
     }
   }
 }
 
-ResultFiles filesIn(const fs::path& folder) {
+ResultFiles filesIn(const fs::path& folder, Kinds kinds = {}) {
   ResultFiles found;
   if (!fs::is_directory(folder)) return found;
-  collect(folder, {}, Level::kResult, found);
+  collect(folder, {}, Level::kResult, kinds, found);
   std::stable_partition(found.files.begin(), found.files.end(),
                         [](const fs::path& file) { return file != kReport; });
   return found;
+}
+
+/// Returns the kinds whose files a new result replaces: without an earlier result its own alone.
+Kinds replacedIn(const fs::path& target, OutputKind kind) {
+  if (ResultFolder::earlierResult(target)) return {};
+  return {kind == OutputKind::kMap, kind == OutputKind::kDepth};
 }
 
 /// Removes the empty ones among the folders of a result.
@@ -116,11 +130,15 @@ void removeEmpty(const fs::path& folder, const ResultFiles& of) {
 }
 
 /// Moves the files of a result: the report last, so that a folder with a report is whole.
-void moveResult(const fs::path& from, const fs::path& to) {
-  const ResultFiles found = filesIn(from);
+void moveResult(const fs::path& from, const fs::path& to, Kinds kinds = {}) {
+  const ResultFiles found = filesIn(from, kinds);
   fs::create_directories(to);
   for (const fs::path& file : found.files) {
     if (file == kLock) continue;
+    if (file == kReport) {  // the others are on the disk before it
+      for (const fs::path& folder : found.folders) syncToDisk(to / folder);
+      syncToDisk(to);
+    }
     fs::create_directories((to / file).parent_path());
     fs::rename(from / file, to / file);
   }
@@ -137,7 +155,23 @@ void removeResult(const fs::path& folder) {
   ::rmdir(folder.c_str());
 }
 
+/// Moves what does not belong to a result, and is not there yet.
+void moveOthers(const fs::path& from, const fs::path& to) {
+  for (const fs::path& other : filesIn(from).others) {
+    if (fs::exists(fs::symlink_status(to / other))) continue;
+    fs::create_directories((to / other).parent_path());
+    fs::rename(from / other, to / other);
+  }
+}
+
 bool hasReport(const fs::path& folder) { return fs::exists(folder / kReport); }
+
+/// Returns the kind of the run that wrote a folder.
+Kinds kindsOf(const fs::path& partial) {
+  std::string name;
+  std::ifstream(partial / kLock) >> name;
+  return {name != "depth", name == "depth"};
+}
 
 /// Gives an earlier result its place back, if a run ended while it replaced the result.
 void recover(const ResultFolder::Places& places) {
@@ -150,7 +184,7 @@ void recover(const ResultFolder::Places& places) {
     return fs::rename(places.earlier, places.target);
   }
   if (places.in_place && !hasReport(places.target)) {  // the run was moving its own result here
-    moveResult(places.target, places.partial);
+    moveResult(places.target, places.partial, kindsOf(places.partial));
     moveResult(places.earlier, places.target);
   }
   removeResult(places.earlier);
@@ -166,12 +200,13 @@ flock wholeFile() {
 }
 
 /// Rejects what has the name of a result's file, but is none.
-void rejectInTheWay(const fs::path& target) {
+void rejectInTheWay(const fs::path& target, Kinds kinds) {
   for (const auto& entry : fs::directory_iterator(target)) {
     const std::string name = entry.path().filename().string();
     const fs::file_status status = entry.symlink_status();
-    const bool is_file = isFileOf(Level::kResult, name);
-    if (is_file ? fs::is_regular_file(status) : name != kKeyframes || fs::is_directory(status)) {
+    const bool is_file = isFileOf(Level::kResult, name, kinds);
+    if (is_file ? fs::is_regular_file(status)
+                : !folderOf(Level::kResult, name, kinds) || fs::is_directory(status)) {
       continue;
     }
     throw std::runtime_error(entry.path().string() + ": has the name of a " +
@@ -229,7 +264,7 @@ bool EarlierResult::isOf(const std::vector<std::string>& files) const {
   return text(recording) == text(files);
 }
 
-ResultFolder::Places::Places(const fs::path& out) {
+ResultFolder::Places::Places(const fs::path& out, OutputKind kind) {
   if (out.empty()) throw std::runtime_error("'': expected the name of the folder to write");
   target = fs::absolute(out);
   if (fs::is_symlink(out) && !fs::exists(out)) {
@@ -245,7 +280,7 @@ ResultFolder::Places::Places(const fs::path& out) {
   }
   const fs::path inner = target / "result";
   in_place = fs::exists(target) &&
-             (!canBeRenamed(target) || !filesIn(target).all ||
+             (!canBeRenamed(target) || !filesIn(target, replacedIn(target, kind)).others.empty() ||
               fs::exists(inner.string() + ".earlier") || fs::exists(inner.string() + ".moving"));
   const std::string base = in_place ? inner.string() : target.string();
   partial = base + ".partial";
@@ -272,16 +307,16 @@ std::optional<EarlierResult> ResultFolder::earlierResult(const fs::path& out) {
 }
 
 bool ResultFolder::hasPartial(const fs::path& out) {
-  if (fs::exists(out) && !fs::is_directory(out)) return false;
-  return fs::exists(out / kLock) || fs::exists(Places(out).partial);
+  if (out.empty() || (fs::exists(fs::symlink_status(out)) && !fs::is_directory(out))) return false;
+  return fs::exists(out / kLock) || fs::exists(Places(out, OutputKind::kMap).partial);
 }
 
 void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
-  const Places places(out);
+  const Places places(out, kind);
   if (isAtWork(places.partial)) throw atWork(out);
   recover(places);
   if (!fs::exists(places.target)) return;
-  rejectInTheWay(places.target);
+  rejectInTheWay(places.target, {kind == OutputKind::kMap, kind == OutputKind::kDepth});
   if (force) return;
   const auto has = [&](std::string_view name) { return fs::exists(places.target / name); };
   const bool has_map = has(kKeyframes) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
@@ -305,43 +340,50 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   }
 }
 
-ResultFolder::ResultFolder(fs::path out) : out_(std::move(out)), places_(out_) {
+ResultFolder::Lock::~Lock() {
+  if (file >= 0) ::close(file);
+}
+
+ResultFolder::ResultFolder(fs::path out, OutputKind kind)
+    : out_(std::move(out)), kind_(kind), places_(out_, kind) {
+  makeFolder(places_.partial);
   lock();
   recover(places_);
-  if (countKeyframes(places_.partial) > 0) {  // of a run that was killed
-    removeResult(places_.left);
-    fs::rename(places_.partial, places_.left);
-    ::close(lock_);
-    lock();
-  }
-  for (const fs::path& file : filesIn(places_.partial).files) {
+  std::ofstream(places_.partial / kLock) << (kind == OutputKind::kDepth ? "depth" : "map");
+  if (countKeyframes(places_.partial) > 0) moveResult(places_.partial, places_.left);
+  const ResultFiles useless = filesIn(places_.partial);
+  for (const fs::path& file : useless.files) {
     if (file != kLock) ::unlink((places_.partial / file).c_str());
   }
-  removeEmpty(places_.partial, filesIn(places_.partial));
+  removeEmpty(places_.partial, useless);
   if (fs::exists(places_.left)) left_ = places_.left;
 }
 
-/// Makes the folder if it is not there, and locks it. @throws std::runtime_error if another run has
-/// it.
+/// Locks the folder. @throws std::runtime_error if another run has it.
 void ResultFolder::lock() {
-  makeFolder(places_.partial);
   const fs::path path = places_.partial / kLock;
-  lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (lock_ < 0) {
-    const std::string why = reasonNotWritten(errno);
-    throw std::runtime_error("cannot write " + path.string() + ": " +
-                             (why.empty() ? std::strerror(errno) : why));
-  }
-  flock lock = wholeFile();
-  if (::fcntl(lock_, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
-    ::close(lock_);
-    throw atWork(out_);
-  }  // on a file system without locks, another run is not detected
+  struct stat status {};
+  do {  // again, if a run that ended meanwhile has removed the file
+    if (lock_.file >= 0) ::close(std::exchange(lock_.file, -1));
+    lock_.file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (lock_.file < 0) {
+      const std::string why = reasonNotWritten(errno);
+      throw std::runtime_error("cannot write " + path.string() + ": " +
+                               (why.empty() ? std::strerror(errno) : why));
+    }
+    flock lock = wholeFile();
+    if (::fcntl(lock_.file, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
+      throw atWork(out_);
+    }  // on a file system without locks, another run is not detected
+  } while (::fstat(lock_.file, &status) == 0 && status.st_nlink == 0);
 }
 
 ResultFolder::~ResultFolder() {
-  if (!stays_) removeResult(places_.partial);
-  ::close(lock_);
+  if (stays_) return;
+  try {
+    removeResult(places_.partial);
+  } catch (const fs::filesystem_error&) {  // the files stay
+  }
 }
 
 void ResultFolder::commit() {
@@ -361,45 +403,49 @@ void ResultFolder::replace() {
   for (const fs::path& file : found.files) syncToDisk(partial / file);
   for (const fs::path& folder : found.folders) syncToDisk(partial / folder);
   syncToDisk(partial);
-  if (in_place) {
-    try {
-      moveResult(target, moving);
+  try {
+    if (in_place) {
+      moveResult(target, moving, replacedIn(target, kind_));
       fs::rename(moving, earlier);
       moveResult(partial, target);
-    } catch (...) {  // something of others may have come meanwhile
-      recover(places_);
-      throw;
-    }
-    removeResult(partial);
-    removeResult(earlier);
-  } else if (!fs::exists(target)) {
-    fs::rename(partial, target);
-  } else {
-    std::error_code ignored;
-    fs::permissions(partial, fs::status(target).permissions(), ignored);
-    if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
       removeResult(partial);
-    } else if (errno == EINVAL || errno == ENOSYS || errno == EOPNOTSUPP) {
-      fs::rename(target, earlier);
+    } else if (!fs::exists(target)) {
       fs::rename(partial, target);
-      removeResult(earlier);
     } else {
-      throw fs::filesystem_error("cannot be renamed", partial, target,
-                                 std::error_code(errno, std::generic_category()));
+      std::error_code ignored;
+      fs::permissions(partial, fs::status(target).permissions(), ignored);
+      if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+        fs::rename(partial, earlier);
+      } else if (errno == EINVAL || errno == ENOSYS || errno == EOPNOTSUPP) {
+        fs::rename(target, earlier);
+        fs::rename(partial, target);
+      } else {
+        throw fs::filesystem_error("", target, std::error_code(errno, std::generic_category()));
+      }
     }
+  } catch (...) {
+    recover(places_);
+    throw;
   }
   ::unlink((target / kLock).c_str());
   syncToDisk(target.parent_path());
+  moveOthers(earlier, target);  // they came meanwhile
+  removeResult(earlier);
   removeResult(left);
 }
 
 std::string ResultFolder::abandon() {
+  if (stays_) return {};  // the error of `commit` says what is where
   if (hasEarlier()) return fmt::format("; the earlier result in {} stays", out_.string());
-  const std::uint64_t keyframes = countKeyframes(places_.partial);
-  stays_ = keyframes > 0;
-  if (!stays_) return {};
-  return fmt::format("; the keyframes before it ({}) are in {}", keyframes,
-                     places_.partial.string());
+  try {
+    const std::uint64_t keyframes = countKeyframes(places_.partial);
+    stays_ = keyframes > 0;
+    if (!stays_) return {};
+    return fmt::format("; the keyframes before it ({}) are in {}", keyframes,
+                       places_.partial.string());
+  } catch (const fs::filesystem_error&) {  // the disk cannot be read
+    return {};
+  }
 }
 
 std::uint64_t countKeyframes(const fs::path& folder) {

@@ -36,9 +36,9 @@ struct EarlierResult {
 ///
 /// Where OUT cannot be renamed (a mount point, the working folder, a parent that cannot be written)
 /// or holds other files, which stay, the folders lie within OUT: result.partial, result.left,
-/// result.earlier. At the end the earlier files are moved to result.earlier one by one (and called
-/// result.moving until then), and the new ones to OUT, report.json last. If OUT is a symbolic link,
-/// all this is about its target.
+/// result.earlier. At the end the earlier files are moved one by one to result.moving, which is
+/// then renamed to result.earlier. Then the new files are moved to OUT, report.json last. If OUT is
+/// a symbolic link, this applies to its target.
 class ResultFolder {
  public:
   /// Rejects a folder that is not for a result: another run is at work there, or, without `force`,
@@ -53,7 +53,7 @@ class ResultFolder {
 
   /// Makes the folder that is written to. No other run can do so until this object is destroyed.
   /// @throws std::runtime_error naming the folder if it cannot be made, or another run is at work.
-  explicit ResultFolder(std::filesystem::path out);
+  ResultFolder(std::filesystem::path out, OutputKind kind);
   /// Removes the files, unless `commit` or `abandon` was called.
   ~ResultFolder();
   ResultFolder(const ResultFolder&) = delete;
@@ -63,7 +63,7 @@ class ResultFolder {
   const std::filesystem::path& out() const { return out_; }
   /// Returns the folder to write to.
   const std::filesystem::path& path() const { return places_.partial; }
-  /// Returns the folder with the files of a run that was killed; empty if there is none.
+  /// Returns the folder with the keyframes of killed runs; empty if there is none.
   const std::filesystem::path& left() const { return left_; }
   /// Returns whether OUT has a result, which the commit replaces.
   bool hasEarlier() const { return earlierResult(out_).has_value(); }
@@ -77,7 +77,7 @@ class ResultFolder {
 
   /// The places of a result.
   struct Places {
-    explicit Places(const std::filesystem::path& out);
+    Places(const std::filesystem::path& out, OutputKind kind);
 
     std::filesystem::path target;  ///< OUT without links.
     bool in_place = false;         ///< The others lie within the target.
@@ -86,13 +86,22 @@ class ResultFolder {
   };
 
  private:
+  struct Lock {
+    int file = -1;
+    Lock() = default;
+    ~Lock();
+    Lock(const Lock&) = delete;
+    Lock& operator=(const Lock&) = delete;
+  };
+
   void lock();
   void replace();
 
   std::filesystem::path out_;
+  OutputKind kind_;
   Places places_;
   std::filesystem::path left_;
-  int lock_ = -1;
+  Lock lock_;
   bool stays_ = false;
 };
 

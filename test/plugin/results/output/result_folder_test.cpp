@@ -106,7 +106,7 @@ class ResultFolderTest : public TemporaryFolder {
  protected:
   /// Writes the result of a run to OUT.
   void run(const fs::path& out, const std::string& name) {
-    ResultFolder folder(out);
+    ResultFolder folder(out, OutputKind::kMap);
     write(folder.path(), resultOf(name));
     folder.commit();
   }
@@ -160,7 +160,7 @@ INSTANTIATE_TEST_SUITE_P(All, EachBefore,
 TEST_P(EachBefore, TheResultIsThereAtTheEndAndNothingElse) {
   const Files before = make();
   {
-    ResultFolder folder(out());
+    ResultFolder folder(out(), OutputKind::kMap);
     EXPECT_EQ(folder.hasEarlier(), before.count("report.json") > 0);
     write(folder.path(), resultOf("the new run"));
     if (hasOthers()) {
@@ -179,10 +179,10 @@ TEST_P(EachBefore, TheResultIsThereAtTheEndAndNothingElse) {
 
 TEST_P(EachBefore, WithoutACommitAllIsAsBefore) {
   const Files before = make();
-  { ResultFolder(out()).path(); }
-  { write(ResultFolder(out()).path(), resultOf("the new run")); }
+  { ResultFolder(out(), OutputKind::kMap).path(); }
+  { write(ResultFolder(out(), OutputKind::kMap).path(), resultOf("the new run")); }
   EXPECT_EQ(filesBelow(folder() / "a").size(), before.size());
-  ResultFolder folder(out());
+  ResultFolder folder(out(), OutputKind::kMap);
   EXPECT_EQ(folder.abandon().find("stays") != std::string::npos, before.count("report.json") > 0);
 }
 
@@ -197,7 +197,7 @@ TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
       const Files before = make();
       ended = runApart([&] {
         g_exchanges = exchanges;
-        ResultFolder folder(out());
+        ResultFolder folder(out(), OutputKind::kMap);
         write(folder.path(), resultOf("the new run"));
         g_kill_before = moment;
         folder.commit();
@@ -220,6 +220,37 @@ TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
   }
 }
 
+TEST_F(ResultFolderTest, FilesOfTheOtherKindStayIfNoResultWasThere) {
+  const fs::path out = folder() / "out";
+  const Files of_depth = {{"points.pcd", "mine"}, {"depth.png", "mine"}, {"cam0/depth.png", "mine"}};
+  write(out, of_depth);
+  for (const int moment : {4, 0}) {
+    runApart([&] {
+      ResultFolder result(out, OutputKind::kMap);
+      write(result.path(), resultOf("new"));
+      g_kill_before = moment;
+      result.commit();
+    });
+    ResultFolder::require(out, OutputKind::kDepth, true);
+    const Files after = filesBelow(out);
+    for (const auto& [name, content] : of_depth) EXPECT_EQ(after.count(name), 1U) << name;
+  }
+  EXPECT_EQ(filesBelow(out), together(resultOf("new"), of_depth));
+}
+
+TEST_F(ResultFolderTest, FilesThatCameMeanwhileStay) {
+  const fs::path out = folder() / "out";
+  run(out, "old");
+  {
+    ResultFolder result(out, OutputKind::kMap);
+    write(result.path(), resultOf("new"));
+    write(out, kOthers);
+    result.commit();
+  }
+  EXPECT_EQ(filesBelow(out), together(resultOf("new"), kOthers));
+  EXPECT_EQ(filesBelow(folder()).size(), filesBelow(out).size());
+}
+
 TEST_F(ResultFolderTest, TheWorkingFolderIsNotRenamed) {
   const fs::path before = fs::current_path();
   fs::create_directories(folder() / "b");
@@ -227,7 +258,7 @@ TEST_F(ResultFolderTest, TheWorkingFolderIsNotRenamed) {
   fs::current_path(folder() / "b");
   for (const char* out : {".", "../b/", ""}) {
     const fs::path path = *out == '\0' ? folder() : fs::path(out);  // also the folder above it
-    ResultFolder result(path);
+    ResultFolder result(path, OutputKind::kMap);
     EXPECT_EQ(result.path().filename(), "result.partial") << out;
   }
   run(".", "new");
@@ -241,7 +272,7 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
   ASSERT_EQ(pipe(ready), 0);
   const pid_t other = fork();
   if (other == 0) {
-    ResultFolder result(out);
+    ResultFolder result(out, OutputKind::kMap);
     write(result.path(), resultOf("killed"));
     static_cast<void>(::write(ready[1], "x", 1));
     pause();
@@ -252,18 +283,20 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
   const std::string at_work = out.string() + ": another run is writing its result there";
   const auto require = [&] { ResultFolder::require(out, OutputKind::kMap, true); };
   EXPECT_THAT(messageOf(require), HasSubstr(at_work));
-  EXPECT_THAT(messageOf([&] { ResultFolder result(out); }), HasSubstr(at_work));
+  EXPECT_THAT(messageOf([&] { ResultFolder result(out, OutputKind::kMap); }), HasSubstr(at_work));
   EXPECT_TRUE(ResultFolder::hasPartial(out));
   kill(other, SIGKILL);
   waitpid(other, nullptr, 0);
 
   require();
   const fs::path left = folder() / "out.left";
-  {
-    ResultFolder result(out);
+  for (const std::uint64_t keyframes : {2U, 3U}) {
+    ResultFolder result(out, OutputKind::kMap);
     EXPECT_EQ(result.left(), left);
-    EXPECT_EQ(countKeyframes(left), 2U);
-    EXPECT_THAT(messageOf([&] { ResultFolder second(out); }), HasSubstr(at_work));
+    EXPECT_EQ(countKeyframes(left), keyframes) << "of all that were killed";
+    write(result.path(), {{"keyframes/7.000000000/depth.tiff", ""}});
+    result.abandon();
+    EXPECT_THAT(messageOf([&] { ResultFolder second(out, OutputKind::kMap); }), HasSubstr(at_work));
   }
   EXPECT_TRUE(fs::exists(left)) << "that run made no result";
   EXPECT_FALSE(fs::exists(out));
@@ -276,12 +309,12 @@ TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
   const fs::path out = folder() / "out";
   const Files keyframe = {{"keyframes/1.000000000/depth.tiff", ""}};
   {
-    ResultFolder result(out);
+    ResultFolder result(out, OutputKind::kMap);
     EXPECT_EQ(result.abandon(), "") << "nothing was written";
   }
   EXPECT_TRUE(fs::is_empty(folder()));
   {
-    ResultFolder result(out);
+    ResultFolder result(out, OutputKind::kMap);
     write(result.path(), keyframe);
     EXPECT_EQ(result.abandon(),
               "; the keyframes before it (1) are in " + out.string() + ".partial");
@@ -289,7 +322,7 @@ TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
   EXPECT_TRUE(fs::exists(folder() / "out.partial" / "keyframes"));
   run(out, "old");
   {
-    ResultFolder result(out);
+    ResultFolder result(out, OutputKind::kMap);
     write(result.path(), keyframe);
     EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() + " stays");
   }
@@ -329,7 +362,7 @@ TEST_F(ResultFolderTest, FoldersThatAreNotForAResultAreNamed) {
   fs::remove(out);
   fs::create_symlink("nowhere", out);
   EXPECT_THAT(message(OutputKind::kMap), HasSubstr("a link to a folder that does not exist"));
-  EXPECT_THAT(messageOf([&] { ResultFolder result(""); }),
+  EXPECT_THAT(messageOf([&] { ResultFolder result("", OutputKind::kMap); }),
               HasSubstr("'': expected the name of the folder"));
 }
 
