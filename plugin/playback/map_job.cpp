@@ -260,7 +260,7 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   folder.emplace(job.out, kind);
   if (folder->left().empty()) return look;
   addWarning(job.report.warnings, "left-result",
-             "a run was killed: its {} keyframes are in {}; they are removed when this result is "
+             "a run that did not end left {} keyframes in {}; they are removed when this result is "
              "complete",
              countKeyframes(folder->left()), folder->left().string());
   warnOfNew(job);

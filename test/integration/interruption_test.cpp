@@ -120,6 +120,7 @@ TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
   const std::set<std::string> earlier = files();
   // A keyframe of a killed run: the next run renames its folder before it maps.
   fs::create_directories(folder() / "out.partial");
+  std::ofstream(folder() / "out.partial" / "run.lock");
   fs::copy(out() / "keyframes", folder() / "out.partial" / "keyframes",
            fs::copy_options::recursive);
   // Packets of single events are slow to read.

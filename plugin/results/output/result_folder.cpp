@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -129,13 +130,21 @@ void removeEmpty(const fs::path& folder, const ResultFiles& of) {
   for (const fs::path& inner : of.folders) ::rmdir((folder / inner).c_str());
 }
 
-/// Moves the files of a result: the report last, so that a folder with a report is whole.
-void moveResult(const fs::path& from, const fs::path& to, Kinds kinds = {}) {
-  const ResultFiles found = filesIn(from, kinds);
-  fs::create_directories(to);
+/// Marks a folder as one that a run has made: other folders of such a name are not touched.
+void mark(const fs::path& folder) {
+  fs::create_directories(folder);
+  std::ofstream(folder / kLock, std::ios::app);
+}
+
+/// Moves the files of a result. A folder with a report is whole: the report is the last one, or the
+/// first one if the result is moved away.
+void moveResult(const fs::path& from, const fs::path& to, Kinds kinds = {}, bool away = false) {
+  ResultFiles found = filesIn(from, kinds);
+  if (away) std::reverse(found.files.begin(), found.files.end());
+  mark(to);
   for (const fs::path& file : found.files) {
     if (file == kLock) continue;
-    if (file == kReport) {  // the others are on the disk before it
+    if (file == kReport && !away) {  // the others are on the disk before it
       for (const fs::path& folder : found.folders) syncToDisk(to / folder);
       syncToDisk(to);
     }
@@ -146,12 +155,16 @@ void moveResult(const fs::path& from, const fs::path& to, Kinds kinds = {}) {
   syncToDisk(to);
 }
 
-/// Removes the files of a result, the report first, and the folder if it is empty then.
+/// Removes the files of a result, the report first and the mark last, and the folder if it is empty
+/// then.
 void removeResult(const fs::path& folder) {
   ResultFiles found = filesIn(folder);
   std::reverse(found.files.begin(), found.files.end());
-  for (const fs::path& file : found.files) ::unlink((folder / file).c_str());
+  for (const fs::path& file : found.files) {
+    if (file != kLock) ::unlink((folder / file).c_str());
+  }
   removeEmpty(folder, found);
+  ::unlink((folder / kLock).c_str());
   ::rmdir(folder.c_str());
 }
 
@@ -177,17 +190,28 @@ Kinds kindsOf(const fs::path& partial) {
 void recover(const ResultFolder::Places& places) {
   if (fs::exists(places.moving)) {  // the run was moving the earlier result away
     moveResult(places.moving, places.target);
-    return removeResult(places.moving);
+    removeResult(places.moving);
+  } else if (!places.in_place && fs::exists(places.earlier) && !fs::exists(places.target)) {
+    fs::rename(places.earlier, places.target);
+  } else if (fs::exists(places.earlier)) {
+    if (places.in_place && !hasReport(places.target)) {  // the run was moving its own result here
+      moveResult(places.target, places.partial, kindsOf(places.partial));
+      moveResult(places.earlier, places.target);
+    }
+    removeResult(places.earlier);
   }
-  if (!fs::exists(places.earlier)) return;
-  if (!places.in_place && !fs::exists(places.target)) {
-    return fs::rename(places.earlier, places.target);
+  if (hasReport(places.target)) ::unlink((places.target / kLock).c_str());
+}
+
+/// Rejects folders and files of others that have the names of a run's folders.
+void rejectForeign(const ResultFolder::Places& places) {
+  for (const fs::path& path : {places.partial, places.left, places.earlier, places.moving}) {
+    const fs::file_status status = fs::symlink_status(path);
+    if (!fs::exists(status) || (path == places.moving && !places.in_place)) continue;
+    if (fs::is_directory(status) && (fs::exists(path / kLock) || fs::is_empty(path))) continue;
+    throw std::runtime_error(path.string() + ": a run for " + places.target.string() +
+                             " needs this name: expected no such folder or file (rename it)");
   }
-  if (places.in_place && !hasReport(places.target)) {  // the run was moving its own result here
-    moveResult(places.target, places.partial, kindsOf(places.partial));
-    moveResult(places.earlier, places.target);
-  }
-  removeResult(places.earlier);
 }
 
 /// Returns a lock of the whole file. The lock belongs to the open file, not to the process, so it
@@ -229,18 +253,28 @@ std::runtime_error atWork(const fs::path& out) {
                             ": another run is writing its result there: expected another folder");
 }
 
+/// Rejects a folder that another run is writing for, also if it writes in another place.
+void rejectAtWork(const ResultFolder::Places& places, const fs::path& out) {
+  const fs::path& target = places.target;
+  for (const fs::path& partial : {places.partial, target, fs::path(target.string() + ".partial"),
+                                  target / "result.partial"}) {
+    if (isAtWork(partial)) throw atWork(out);
+  }
+}
+
 std::runtime_error cannotMake(const fs::path& folder, const std::string& why) {
   return std::runtime_error("cannot make the folder " + folder.string() + ": " + why);
 }
 
+bool isMountPoint(const fs::path& folder) {
+  struct statx status {};
+  return ::statx(AT_FDCWD, folder.c_str(), 0, 0, &status) == 0 &&
+         (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
+}
+
 /// Returns whether a folder can be renamed in its parent folder.
 bool canBeRenamed(const fs::path& folder) {
-  struct stat own {};
-  struct stat parent {};
-  if (::stat(folder.c_str(), &own) != 0 || ::stat(folder.parent_path().c_str(), &parent) != 0) {
-    return false;
-  }
-  if (own.st_dev != parent.st_dev || own.st_ino == parent.st_ino) return false;  // a mount point
+  if (isMountPoint(folder) || folder == folder.root_path()) return false;
   if (::access(folder.parent_path().c_str(), W_OK | X_OK) != 0) return false;
   std::error_code ignored;
   const fs::path working = fs::current_path(ignored);  // it would go with the earlier result
@@ -266,9 +300,10 @@ bool EarlierResult::isOf(const std::vector<std::string>& files) const {
 
 ResultFolder::Places::Places(const fs::path& out, OutputKind kind) {
   if (out.empty()) throw std::runtime_error("'': expected the name of the folder to write");
-  target = fs::absolute(out);
-  if (fs::is_symlink(out) && !fs::exists(out)) {
-    target = fs::absolute(out).parent_path() / fs::read_symlink(out);
+  const fs::path named = out.has_filename() ? out : out.parent_path();  // without a slash
+  target = fs::absolute(named);
+  if (fs::is_symlink(named) && !fs::exists(named)) {
+    target = target.parent_path() / fs::read_symlink(named);
     if (!fs::exists(target.string() + ".earlier")) {
       throw cannotMake(out, "it is a link to a folder that does not exist");
     }
@@ -278,15 +313,30 @@ ResultFolder::Places::Places(const fs::path& out, OutputKind kind) {
   if (fs::exists(target) && !fs::is_directory(target)) {
     throw cannotMake(out, "a file of that name is there");
   }
-  const fs::path inner = target / "result";
-  in_place = fs::exists(target) &&
-             (!canBeRenamed(target) || !filesIn(target, replacedIn(target, kind)).others.empty() ||
-              fs::exists(inner.string() + ".earlier") || fs::exists(inner.string() + ".moving"));
-  const std::string base = in_place ? inner.string() : target.string();
+  const Places inner = within(target);
+  const bool is_long = target.filename().native().size() + std::strlen(".partial") > NAME_MAX;
+  if (is_long || (fs::exists(target) &&
+                  (!canBeRenamed(target) || fs::exists(inner.earlier) || fs::exists(inner.moving) ||
+                   !filesIn(target, replacedIn(target, kind)).others.empty()))) {
+    *this = inner;
+  } else {
+    setNames(target.string());
+  }
+}
+
+void ResultFolder::Places::setNames(const std::string& base) {
   partial = base + ".partial";
   left = base + ".left";
   earlier = base + ".earlier";
   moving = base + ".moving";
+}
+
+ResultFolder::Places ResultFolder::Places::within(const fs::path& target) {
+  Places inner;
+  inner.target = target;
+  inner.in_place = true;
+  inner.setNames((target / "result").string());
+  return inner;
 }
 
 std::optional<EarlierResult> ResultFolder::earlierResult(const fs::path& out) {
@@ -313,7 +363,8 @@ bool ResultFolder::hasPartial(const fs::path& out) {
 
 void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   const Places places(out, kind);
-  if (isAtWork(places.partial)) throw atWork(out);
+  rejectAtWork(places, out);
+  rejectForeign(places);
   recover(places);
   if (!fs::exists(places.target)) return;
   rejectInTheWay(places.target, {kind == OutputKind::kMap, kind == OutputKind::kDepth});
@@ -346,6 +397,8 @@ ResultFolder::Lock::~Lock() {
 
 ResultFolder::ResultFolder(fs::path out, OutputKind kind)
     : out_(std::move(out)), kind_(kind), places_(out_, kind) {
+  rejectAtWork(places_, out_);
+  rejectForeign(places_);
   makeFolder(places_.partial);
   lock();
   recover(places_);
@@ -403,35 +456,51 @@ void ResultFolder::replace() {
   for (const fs::path& file : found.files) syncToDisk(partial / file);
   for (const fs::path& folder : found.folders) syncToDisk(partial / folder);
   syncToDisk(partial);
+  Places used = places_;
   try {
-    if (in_place) {
-      moveResult(target, moving, replacedIn(target, kind_));
-      fs::rename(moving, earlier);
+    if (!in_place && !fs::exists(target)) {
+      fs::rename(partial, target);
+    } else if (in_place || !exchange()) {
+      used = Places::within(target);  // also if the folder cannot be renamed
+      used.partial = partial;
+      moveResult(target, used.moving, replacedIn(target, kind_), true);
+      fs::rename(used.moving, used.earlier);
       moveResult(partial, target);
       removeResult(partial);
-    } else if (!fs::exists(target)) {
-      fs::rename(partial, target);
-    } else {
-      std::error_code ignored;
-      fs::permissions(partial, fs::status(target).permissions(), ignored);
-      if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
-        fs::rename(partial, earlier);
-      } else if (errno == EINVAL || errno == ENOSYS || errno == EOPNOTSUPP) {
-        fs::rename(target, earlier);
-        fs::rename(partial, target);
-      } else {
-        throw fs::filesystem_error("", target, std::error_code(errno, std::generic_category()));
-      }
     }
   } catch (...) {
-    recover(places_);
+    recover(used);
     throw;
   }
   ::unlink((target / kLock).c_str());
   syncToDisk(target.parent_path());
-  moveOthers(earlier, target);  // they came meanwhile
-  removeResult(earlier);
+  moveOthers(used.earlier, target);  // they came meanwhile
+  removeResult(used.earlier);
   removeResult(left);
+}
+
+/// Exchanges the names of the new result and of the folder that is there. @return false if it
+/// cannot be renamed.
+bool ResultFolder::exchange() {
+  const auto& [target, in_place, partial, left, earlier, moving] = places_;
+  struct stat status {};
+  if (::stat(target.c_str(), &status) == 0) {
+    ::chmod(partial.c_str(), status.st_mode);
+    if (::chown(partial.c_str(), status.st_uid, status.st_gid) != 0) errno = 0;  // not allowed
+  }
+  mark(target);
+  if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+    std::error_code error;
+    fs::rename(partial, earlier, error);
+    if (error) removeResult(partial);
+    return true;
+  }
+  if (errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP) return false;
+  std::error_code error;  // the file system cannot exchange names
+  fs::rename(target, earlier, error);
+  if (error) return false;
+  fs::rename(partial, target);
+  return true;
 }
 
 std::string ResultFolder::abandon() {

@@ -78,11 +78,17 @@ class ResultFolder {
   /// The places of a result.
   struct Places {
     Places(const std::filesystem::path& out, OutputKind kind);
+    /// Returns the places within OUT.
+    static Places within(const std::filesystem::path& target);
 
     std::filesystem::path target;  ///< OUT without links.
     bool in_place = false;         ///< The others lie within the target.
     std::filesystem::path partial, left, earlier;
     std::filesystem::path moving;  ///< In place: a part of the earlier result.
+
+   private:
+    Places() = default;
+    void setNames(const std::string& base);
   };
 
  private:
@@ -96,6 +102,7 @@ class ResultFolder {
 
   void lock();
   void replace();
+  bool exchange();
 
   std::filesystem::path out_;
   OutputKind kind_;

@@ -13,9 +13,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "test/plugin/temporary_folder.h"
 
@@ -23,8 +25,8 @@ namespace {
 
 /// The process is killed before this change of names (1: the first one); 0: never.
 int g_kill_before = 0;
-/// False: the file system cannot exchange two names.
-bool g_exchanges = true;
+/// The error of an exchange of two names; 0: none.
+int g_exchange_error = 0;
 
 void countChange() {
   if (g_kill_before > 0 && --g_kill_before == 0) kill(getpid(), SIGKILL);
@@ -42,8 +44,8 @@ int rename(const char* from, const char* to) noexcept {
 }
 int renameat2(int, const char* from, int, const char* to, unsigned int flags) noexcept {
   countChange();
-  if (!g_exchanges) {
-    errno = EINVAL;
+  if (g_exchange_error != 0) {
+    errno = g_exchange_error;
     return -1;
   }
   return resultOf(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, flags));
@@ -189,14 +191,15 @@ TEST_P(EachBefore, WithoutACommitAllIsAsBefore) {
 /// Kills a run before each change of a name. After the next command has looked at the folder, the
 /// earlier result or the new one is whole, and the files of others are there.
 TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
-  for (const bool exchanges : {true, false}) {
+  // The file system cannot exchange names; the folder cannot be renamed.
+  for (const int exchange_error : {0, EINVAL, EBUSY}) {
     bool ended = false;
     int new_ones = 0;
     for (int moment = 1; !ended; ++moment) {
-      SCOPED_TRACE(fmt::format("exchanges {}, moment {}", exchanges, moment));
+      SCOPED_TRACE(fmt::format("error {}, moment {}", exchange_error, moment));
       const Files before = make();
       ended = runApart([&] {
-        g_exchanges = exchanges;
+        g_exchange_error = exchange_error;
         ResultFolder folder(out(), OutputKind::kMap);
         write(folder.path(), resultOf("the new run"));
         g_kill_before = moment;
@@ -209,6 +212,7 @@ TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
       }
       EXPECT_TRUE(after == before || after == made());
       new_ones += after == made() ? 1 : 0;
+      if (exchange_error == EBUSY) run(out(), "a run that may be in place");
       run(out(), "a third run");
       EXPECT_EQ(filesBelow(out()),
                 together(resultOf("a third run"), hasOthers() ? kOthers : Files()));
@@ -222,7 +226,8 @@ TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
 
 TEST_F(ResultFolderTest, FilesOfTheOtherKindStayIfNoResultWasThere) {
   const fs::path out = folder() / "out";
-  const Files of_depth = {{"points.pcd", "mine"}, {"depth.png", "mine"}, {"cam0/depth.png", "mine"}};
+  const Files of_depth = {
+      {"points.pcd", "mine"}, {"depth.png", "mine"}, {"cam0/depth.png", "mine"}};
   write(out, of_depth);
   for (const int moment : {4, 0}) {
     runApart([&] {
@@ -296,13 +301,39 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
     EXPECT_EQ(countKeyframes(left), keyframes) << "of all that were killed";
     write(result.path(), {{"keyframes/7.000000000/depth.tiff", ""}});
     result.abandon();
-    EXPECT_THAT(messageOf([&] { ResultFolder second(out, OutputKind::kMap); }), HasSubstr(at_work));
+    for (const fs::path& same : {out, result.path()}) {
+      EXPECT_THAT(messageOf([&] { ResultFolder second(same, OutputKind::kMap); }),
+                  HasSubstr("another run is writing its result there"));
+    }
   }
   EXPECT_TRUE(fs::exists(left)) << "that run made no result";
   EXPECT_FALSE(fs::exists(out));
   run(out, "new");
   EXPECT_FALSE(fs::exists(left));
   EXPECT_EQ(filesBelow(folder()).size(), resultOf("new").size());
+}
+
+TEST_F(ResultFolderTest, FoldersThatNoRunHasMadeAreNotTouched) {
+  const fs::path out = folder() / "out";
+  for (const char* name : {"out.partial", "out.left", "out.earlier"}) {
+    const fs::path path = folder() / name;
+    const std::vector<std::function<void()>> foreign = {
+        [&] { write(path, resultOf("a user's own")); }, [&] { std::ofstream(path) << "mine"; },
+        [&] { fs::create_symlink("elsewhere", path); }};
+    for (const auto& make : foreign) {
+      make();
+      const auto before = fs::symlink_status(path).type();
+      for (const auto& call : std::vector<std::function<void()>>{
+               [&] { ResultFolder::require(out, OutputKind::kMap, true); },
+               [&] { ResultFolder result(out, OutputKind::kMap); }}) {
+        EXPECT_THAT(messageOf(call), HasSubstr(path.string() + ": a run for ")) << name;
+      }
+      EXPECT_EQ(fs::symlink_status(path).type(), before);
+      EXPECT_FALSE(fs::exists(out));
+      if (fs::is_directory(path)) EXPECT_EQ(filesBelow(path), resultOf("a user's own"));
+      fs::remove_all(path);
+    }
+  }
 }
 
 TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
