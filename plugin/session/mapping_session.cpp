@@ -94,9 +94,8 @@ void MappingSession::feed(EventPacket packet) {
 
 void MappingSession::addPose(const PoseSample& sample) {
   const PoseSourceId& source = sample.source;
-  const std::exception_ptr error =
-      usePoses(pose_source_.add(source, {sample.t_ns, sample.T_world_rig()}));
-  if (error) std::rethrow_exception(error);
+  const std::string error = usePoses(pose_source_.add(source, {sample.t_ns, sample.T_world_rig()}));
+  if (!error.empty()) throw std::invalid_argument(error);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // If two poses have the same time, the first one is used, and so is its noise.
   if (refinement_ && used) store_.noises[source].try_emplace(sample.t_ns, sample.noise);
@@ -112,17 +111,17 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   return noises.begin()->second;
 }
 
-/// Uses poses, also after a rejected one. @return the first error.
-std::exception_ptr MappingSession::usePoses(const std::vector<StampedPose>& poses) {
-  std::exception_ptr error;
+/// Uses poses, also after a rejected one. @return why the first one was rejected; empty: none was.
+std::string MappingSession::usePoses(const std::vector<StampedPose>& poses) {
+  std::string error;
   for (const StampedPose& pose : poses) {
     try {
       store_.mapper.addPose(pose);
       extend(status_.poses, pose.t_ns);
       store_.newest_pose_ns = std::max(store_.newest_pose_ns.value_or(pose.t_ns), pose.t_ns);
-    } catch (const std::invalid_argument&) {
+    } catch (const std::invalid_argument& rejected) {
       ++live_.rejected_poses;
-      if (!error) error = std::current_exception();
+      if (error.empty()) error = rejected.what();
     }
   }
   return error;
@@ -131,8 +130,8 @@ std::exception_ptr MappingSession::usePoses(const std::vector<StampedPose>& pose
 /// Selects a source of poses, if there is none yet, and uses its waiting poses. `finish` throws
 /// their first error.
 void MappingSession::useSelected() {
-  const std::exception_ptr error = usePoses(pose_source_.select());
-  if (!waiting_error_) waiting_error_ = error;
+  const std::string error = usePoses(pose_source_.select());
+  if (waiting_error_.empty()) waiting_error_ = error;
 }
 
 void MappingSession::noteMissing(const Missing& missing) {
@@ -205,7 +204,7 @@ void MappingSession::finish() {
   store_.missing.clear();
   store_.mapper.finish();
   useSelected();
-  if (waiting_error_) std::rethrow_exception(std::exchange(waiting_error_, nullptr));
+  if (!waiting_error_.empty()) throw std::invalid_argument(std::exchange(waiting_error_, {}));
 }
 
 void MappingSession::limitWaits() {

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <exception>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -134,7 +134,7 @@ class MappingSession {
   void dropMissing(int camera, std::int64_t next_ns);
   void dropOverdue(std::int64_t newest_begin_ns);
   void feed(EventPacket packet);
-  std::exception_ptr usePoses(const std::vector<StampedPose>& poses);
+  std::string usePoses(const std::vector<StampedPose>& poses);
   void useSelected();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   // A piece of the input has one clock, and no jump of the tracker.
@@ -186,9 +186,9 @@ class MappingSession {
   bool finished_ = false;
   bool keyframe_lost_ = false;  // the last call of `next` made a keyframe and threw
   bool all_refined_ = false;
-  std::exception_ptr waiting_error_;  // the first of poses that waited for their source
-  double reported_needed_ = 0;        // events of a reported window that was too large
-  SessionStatus status_;              // incomplete: see status()
+  std::string waiting_error_;   // why the first pose that waited for its source was rejected
+  double reported_needed_ = 0;  // events of a reported window that was too large
+  SessionStatus status_;        // incomplete: see status()
 };
 
 }  // namespace efm

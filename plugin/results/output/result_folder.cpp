@@ -171,9 +171,10 @@ void removeResult(const fs::path& folder) {
 /// Moves what does not belong to a result, and is not there yet.
 void moveOthers(const fs::path& from, const fs::path& to) {
   for (const fs::path& other : filesIn(from).others) {
-    if (fs::exists(fs::symlink_status(to / other))) continue;
-    fs::create_directories((to / other).parent_path());
-    fs::rename(from / other, to / other);
+    std::error_code ignored;  // it stays where it is
+    if (fs::exists(fs::symlink_status(to / other, ignored))) continue;
+    fs::create_directories((to / other).parent_path(), ignored);
+    fs::rename(from / other, to / other, ignored);
   }
 }
 
@@ -358,7 +359,7 @@ std::optional<EarlierResult> ResultFolder::earlierResult(const fs::path& out) {
 
 bool ResultFolder::hasPartial(const fs::path& out) {
   if (out.empty() || (fs::exists(fs::symlink_status(out)) && !fs::is_directory(out))) return false;
-  return fs::exists(out / kLock) || fs::exists(Places(out, OutputKind::kMap).partial);
+  return fs::exists(out / kLock) || fs::exists(Places(out, OutputKind::kMap).partial / kLock);
 }
 
 void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
@@ -367,6 +368,9 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   rejectForeign(places);
   recover(places);
   if (!fs::exists(places.target)) return;
+  if (::access(places.target.c_str(), W_OK | X_OK) != 0) {
+    throw std::runtime_error("cannot write into " + out.string() + ": " + std::strerror(errno));
+  }
   rejectInTheWay(places.target, {kind == OutputKind::kMap, kind == OutputKind::kDepth});
   if (force) return;
   const auto has = [&](std::string_view name) { return fs::exists(places.target / name); };
@@ -485,8 +489,8 @@ bool ResultFolder::exchange() {
   const auto& [target, in_place, partial, left, earlier, moving] = places_;
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
-    ::chmod(partial.c_str(), status.st_mode);
     if (::chown(partial.c_str(), status.st_uid, status.st_gid) != 0) errno = 0;  // not allowed
+    ::chmod(partial.c_str(), status.st_mode);
   }
   mark(target);
   if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
