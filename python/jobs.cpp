@@ -26,7 +26,7 @@ using StopFlag = std::atomic<bool>;
 MapJob jobOf(const RecordingSource& source, const Options& options, const OnKeyframe& on_keyframe,
              const OnProgress& on_progress) {
   MapJob job = MapJob::of(source, options);
-  job.on_keyframe = [on_keyframe](const Keyframe& keyframe, const MappingRun&) {
+  job.on_keyframe = [on_keyframe](const Keyframe& keyframe, const RecordingKeyframes&) {
     give(keyframe, on_keyframe);
   };
   job.on_progress = ProgressCalls(on_progress);
@@ -83,7 +83,7 @@ std::pair<std::shared_ptr<const Keyframe>, MapResult> mapWindow(const RecordingS
   mapper.only_window = windowOf(times.t0_ns, times.t1_ns, mapper.policy.reference);
   if (times.t_ref_ns) mapper.only_window->t_ref_ns = *times.t_ref_ns;
   job.options.mapper.validate();
-  job.on_keyframe = [&](const Keyframe& keyframe, const MappingRun&) {
+  job.on_keyframe = [&](const Keyframe& keyframe, const RecordingKeyframes&) {
     made = std::make_shared<const Keyframe>(keyframe);
   };
   prepare(job);

@@ -106,11 +106,6 @@ void fillFile(const std::filesystem::path& path, const std::filesystem::path& na
   }
 }
 
-void AtomicFile::fill(
-    const std::function<void(const std::filesystem::path& temporary)>& write) const {
-  fillFile(temporary_, path_, write);
-}
-
 void AtomicFile::replace() {
   syncToDisk(temporary_);
   std::filesystem::rename(temporary_, path_);
@@ -132,7 +127,7 @@ void syncToDisk(const std::filesystem::path& path) {
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write) {
   AtomicFile file(path);
-  file.fill([&](const std::filesystem::path& temporary) {
+  fillFile(file.temporary(), file.path(), [&](const std::filesystem::path& temporary) {
     write(temporary);
     file.replace();
   });

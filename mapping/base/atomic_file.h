@@ -31,8 +31,6 @@ class AtomicFile {
   const std::filesystem::path& path() const { return path_; }
   /// Returns the path of the file to write: empty at first, with the extension of `path`.
   const std::filesystem::path& temporary() const { return temporary_; }
-  /// Fills the temporary file; errors name `path`: see `fillFile`.
-  void fill(const std::function<void(const std::filesystem::path& temporary)>& write) const;
   /// Flushes the complete temporary file to the disk, and renames it to `path`.
   /// @throws std::filesystem::filesystem_error.
   void replace();

@@ -71,8 +71,8 @@ void requireFile(const OptionReader& reader, const char* key, const std::filesys
 }
 
 /// A job of the command line, and the options as they were given, for errors.
-struct MapCommand {
-  MapCommand(const MappingArguments& given, OutputKind output_kind)
+struct CommandLineJob {
+  CommandLineJob(const MappingArguments& given, OutputKind output_kind)
       : arguments(given), kind(output_kind), reader(readerOf(given)) {
     job.source = arguments.source;
     job.options = asUsage([&] { return reader.options(); });
@@ -100,7 +100,7 @@ struct MapCommand {
   int run();
 };
 
-int MapCommand::run() {
+int CommandLineJob::run() {
   MapResult result;
   try {
     result = kind == OutputKind::kMap ? mapInto(job) : mapWindowInto(job);
@@ -108,7 +108,7 @@ int MapCommand::run() {
     if (const auto wrong = reader.wrongOption(error)) throw UsageError(*wrong);
     throw;
   }
-  const MapReport& report = result.report;
+  const RunReport& report = result.report;
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (report.counts.keyframes > 0 && !quiet && !result.kept_earlier) {
     std::cout << summaryOf(report, kind, job.out);
@@ -139,11 +139,11 @@ class Watchers {
         mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force));
   }
 
-  void add(const MappingRun& run, const KeyframeDepthMap& keyframe) {
+  void add(const RecordingKeyframes& run, const KeyframeDepthMap& keyframe) {
     if (!all_.empty()) newest_ = keyframe;
     show(run, false);
   }
-  void show(const MappingRun& run, bool is_last) {
+  void show(const RecordingKeyframes& run, bool is_last) {
     if (!newest_) return;
     const double start_s = run.seconds();
     for (const auto& watcher : all_) {
@@ -169,23 +169,23 @@ class Watchers {
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
-  MapCommand command(arguments, OutputKind::kMap);
+  CommandLineJob command(arguments, OutputKind::kMap);
   MapJob& job = command.job;
   TimeLimits& limits = job.options.mapper.limits;
   limits = RecordingTimes(job.sourceNow()).resolve(arguments.times);
   asUsage([&] { limits.validate(); });
   Watchers watchers(arguments, job);
-  job.on_keyframe = [&](const KeyframeDepthMap& keyframe, const MappingRun& run) {
+  job.on_keyframe = [&](const KeyframeDepthMap& keyframe, const RecordingKeyframes& run) {
     watchers.add(run, keyframe);
   };
-  job.on_last_keyframe = [&](const MappingRun& run) { watchers.show(run, true); };
+  job.on_last_keyframe = [&](const RecordingKeyframes& run) { watchers.show(run, true); };
   const int status = command.run();
   watchers.wait(command.interruption);
   return status;
 }
 
 int runDepth(const DepthArguments& arguments) {
-  MapCommand command(arguments, OutputKind::kDepth);
+  CommandLineJob command(arguments, OutputKind::kDepth);
   MapJob& job = command.job;
   FusionMapperOptions& options = job.options.mapper;
   options.only_window = windowOf(arguments, job.sourceNow(), options.policy.reference);

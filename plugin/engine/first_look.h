@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "mapping/base/text.h"
@@ -38,6 +37,7 @@ class FirstLook {
   /// Adds a sample, unless a MappingSession rejects it or rejected an earlier one.
   /// @return true if all samples so far were added.
   bool take(const Sample& sample);
+  std::uint64_t receivedEvents() const { return received_; }
   /// Returns the result. Call it once: after the last data, or after an error.
   RecordingSurvey finish();
 

@@ -178,11 +178,18 @@ void PlaybackMapper::lookAt(const Input& input) {
 /// Chooses the automatic options at the end of the input, or if too many events are held.
 void PlaybackMapper::chooseIfDue() {
   if (!look_) return;
+  const double max_mb = options_.live.max_queue_mb;
+  const auto in_mb = [](std::uint64_t events) {
+    return static_cast<double>(events * sizeof(Event)) / 1e6;
+  };
+  // The session holds at most what the look has received.
+  const bool may_be_due = finished_ || look_ends_ || survey_;
+  if (!may_be_due && in_mb(look_->receivedEvents()) <= max_mb) return;
   const SessionStatus status = session_.status();
-  const double held_mb = static_cast<double>(status.held_events * sizeof(Event)) / 1e6;
+  const double held_mb = in_mb(status.held_events);
   const bool ends = look_ends_ && status.events &&
                     secondsBetween(status.events->first_ns, status.events->last_ns) > kFirstWindowS;
-  if (!finished_ && !ends && held_mb <= options_.live.max_queue_mb) return;
+  if (!finished_ && !ends && held_mb <= max_mb) return;
   if (!survey_) survey_ = look_->finish();
   RecordingSurvey survey = *survey_;
   const double seen_s = survey.duration_s.value_or(0);

@@ -69,7 +69,7 @@ void MapJob::prepare() {
 
 namespace {
 
-void warnOfNoPoints(MapReport& report) {
+void warnOfNoPoints(RunReport& report) {
   if (report.counts.keyframes == 0 || report.points > 0) return;
   const PixelCounts& pixels = report.pixels;
   const std::uint64_t depths = pixels.candidates - pixels.at_nearest - pixels.at_farthest -
@@ -96,7 +96,7 @@ std::vector<std::string> namesOf(const RecordingSource& source) {
 struct Job : MapJob {
   explicit Job(MapJob given) : MapJob(std::move(given)) {}
 
-  MapReport report;
+  RunReport report;
   std::optional<UserError> write_error;  // the first one
   std::size_t reported_warnings = 0;
   const double start_cpu_s = processSeconds();
@@ -209,8 +209,8 @@ Look lookAt(Job& job) {
   return look;
 }
 
-MappingRun::Host hostOf(const Job& job, const char* activity) {
-  MappingRun::Host host;
+RecordingKeyframes::Host hostOf(const Job& job, const char* activity) {
+  RecordingKeyframes::Host host;
   host.stop = job.stop;
   host.on_progress = [&job, activity](double fraction) {
     if (job.on_progress) job.on_progress(activity, fraction);
@@ -219,8 +219,8 @@ MappingRun::Host hostOf(const Job& job, const char* activity) {
 }
 
 /// Returns a host whose run is no result if it is stopped.
-MappingRun::Host interruptible(const Job& job, const char* activity) {
-  MappingRun::Host host = hostOf(job, activity);
+RecordingKeyframes::Host interruptible(const Job& job, const char* activity) {
+  RecordingKeyframes::Host host = hostOf(job, activity);
   host.stop = [&job] {
     requireNoStop(job);
     return false;
@@ -237,8 +237,8 @@ std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
   of_pass.live.enabled = false;
   RobustMaximum maximum;
   const std::unique_ptr<Recording> all = openRecording(job.sourceNow());
-  MappingRun pass(*all, of_pass, first, std::min(job.verbosity, Verbosity::kNormal),
-                  interruptible(job, "first pass"), "first pass");
+  RecordingKeyframes pass(*all, of_pass, first, std::min(job.verbosity, Verbosity::kNormal),
+                          interruptible(job, "first pass"), "first pass");
   while (const auto keyframe = pass.next()) maximum.add(keyframe->max_confidence);
   return maximum.value();  // the mapping reports an error
 }
@@ -273,8 +273,9 @@ MapOutput outputOf(const Job& job, const ResultFolder& folder) {
 }
 
 /// Fills in the report, except its points.
-void describe(Job& job, MappingRun& run, const RecordingCounts& counts, const MapSnapshot& map) {
-  MapReport& report = job.report;
+void describe(Job& job, RecordingKeyframes& run, const RecordingCounts& counts,
+              const MapSnapshot& map) {
+  RunReport& report = job.report;
   run.describe(report);
   if (!counts.of_calibration.empty()) report.options.mapper.cameras = counts.of_calibration;
   report.recording = namesOf(job.source);
@@ -292,7 +293,7 @@ void describe(Job& job, MappingRun& run, const RecordingCounts& counts, const Ma
 }
 
 /// Warns if the map has no points, few points, or points too far away for floats.
-void judgePoints(MapReport& report, const MapCloud& points) {
+void judgePoints(RunReport& report, const MapCloud& points) {
   warnOfNoPoints(report);
   if (auto warning = farPointsWarning(points, report.options.cloud.voxel_size_m)) {
     report.warnings.push_back(std::move(*warning));
@@ -313,7 +314,7 @@ void endTimes(Job& job) {
 /// run has no keyframe or could not write a file.
 MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<const MapSnapshot> map,
               std::optional<UserError> error) {
-  MapReport& report = job.report;
+  RunReport& report = job.report;
   report.peak_memory_bytes = peakMemoryBytes();
   bool keeps_earlier = false;
   if (folder) {
@@ -423,7 +424,7 @@ void writeMap(Job& job, const MapOutput& output, const MapSnapshot& map,
 /// Writes map.html, which shows the report, and adds the time to the report.
 void writePage(Job& job, const MapOutput& output, const MapSnapshot& map,
                const KeyframePictures& pictures) {
-  MapReport& report = job.report;
+  RunReport& report = job.report;
   StageTimes times;
   report.peak_memory_bytes = peakMemoryBytes();
   {
@@ -464,8 +465,8 @@ MapResult mapInto(MapJob given) {
       sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
       pictures.add(keyframe.map.depth, keyframe.view_events);
     });
-    MappingRun run(*look.recording, job.options, std::move(look.first), job.verbosity,
-                   hostOf(job, "mapping"));
+    RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
+                           hostOf(job, "mapping"));
     while (const auto keyframe = run.next()) {
       if (writes) writer.add(*keyframe);
       if (job.on_keyframe) job.on_keyframe(*keyframe, run);
@@ -513,9 +514,9 @@ MapResult mapWindowInto(MapJob given) {
           mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
     });
     DsiReceiver dsi(job, look.recording->rig(), folder);  // outlives the run
-    MappingRun::Host host = interruptible(job, "mapping");
+    RecordingKeyframes::Host host = interruptible(job, "mapping");
     if (dsi.receives()) host.sink = &dsi;
-    MappingRun run(*look.recording, options, std::move(look.first), job.verbosity, host);
+    RecordingKeyframes run(*look.recording, options, std::move(look.first), job.verbosity, host);
     while (const auto keyframe = run.next()) {
       job.stop = {};  // the window has its keyframe
       writer.add(*keyframe);
@@ -549,7 +550,7 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
     made.rejectError();
     return made;
   });
-  MapReport& report = result.report;
+  RunReport& report = result.report;
   std::string json = reportJson(report);  // as the file, with the program's options
   return {report.counts.keyframes, report.points,
           hostTexts(std::move(report.warnings), HostFace::kRecording), std::move(report.quality),

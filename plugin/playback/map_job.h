@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -10,8 +9,8 @@
 #include <vector>
 
 #include "plugin/playback/error_text.h"
-#include "plugin/playback/mapping_run.h"
 #include "plugin/playback/progress.h"
+#include "plugin/playback/recording_keyframes.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/event_fusion_options.h"
@@ -35,8 +34,8 @@ struct MapJob {
   std::function<bool()> stop;  ///< Returns whether the job is to end as soon as possible.
   std::function<void(const std::vector<Warning>&)> warn;  ///< Receives each warning once.
   std::function<void(const std::string&)> note;
-  std::function<void(const KeyframeDepthMap&, const MappingRun&)> on_keyframe;
-  std::function<void(const MappingRun&)> on_last_keyframe;  ///< After the last keyframe.
+  std::function<void(const KeyframeDepthMap&, const RecordingKeyframes&)> on_keyframe;
+  std::function<void(const RecordingKeyframes&)> on_last_keyframe;  ///< After the last keyframe.
   /// Receives the fraction of an activity that is done, 0 to 1, after each sample.
   std::function<void(const char* activity, double fraction)> on_progress;
   /// `mapWindowInto`: receives the planes of the DSI, before the keyframe, in any order and from
@@ -58,7 +57,7 @@ struct MapJob {
 
 /// The result of a job.
 struct MapResult {
-  MapReport report;
+  RunReport report;
   std::shared_ptr<const MapSnapshot> map;  ///< Never null.
   /// Why the recording was not mapped to its end, or a file of the result could not be written.
   std::optional<UserError> error;

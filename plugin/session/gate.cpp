@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 
 #include "mapping/geometry/rigid3.h"
@@ -173,10 +172,9 @@ void Gate::receive(int index, std::vector<Event> events,
   }
   const auto first = std::find_if_not(
       events.begin(), events.end(), [&](const Event& event) { return camera.checker.pass(event); });
-  std::vector<Event> right;
   std::vector<Event> rest(first, events.end());
   events.erase(first, events.end());
-  std::swap(events, right);
+  std::vector<Event> right = std::move(events);
   std::optional<std::int64_t> first_late_ns;
   std::uint64_t late = 0;
   for (const Event& event : rest) {

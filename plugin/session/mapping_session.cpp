@@ -75,8 +75,9 @@ void MappingSession::feed(EventPacket packet) {
     const StageScope scope(&status_.times, &StageSeconds::filter, Processors::kThis);
     store_.mapper.addEvents(packet.camera, std::move(packet.events));
   }
-  if (packet.complete_until_ns)
+  if (packet.complete_until_ns) {
     store_.mapper.setCompleteUntil(packet.camera, *packet.complete_until_ns);
+  }
   if (empty) {
     if (!packet.complete_until_ns) return;
     dropMissing(packet.camera, trajectoryTime(*packet.complete_until_ns, offset_ns));
@@ -231,12 +232,10 @@ void MappingSession::limitWaits() {
 }
 
 void MappingSession::limitHeld(double max_events) {
-  const auto is_excess = [&] {
-    return static_cast<double>(store_.mapper.heldEvents()) > max_events;
-  };
+  const auto held = [&] { return static_cast<double>(store_.mapper.heldEvents()); };
+  const auto is_excess = [&] { return held() > max_events; };
   constexpr double kEnoughS = 0.001;
-  if (static_cast<double>(store_.mapper.heldEvents()) > options_.live.queueEvents() / 2)
-    useSelected();
+  if (held() > options_.live.queueEvents() / 2) useSelected();
   if (is_excess() && chooseFromSoFar(kEnoughS)) return;
   while (is_excess() && dropOldestWindow()) {
   }
@@ -253,8 +252,7 @@ std::optional<Window> MappingSession::nextWindow() {
 bool MappingSession::dropOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
-  if (store_.mapper.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns))
-    return false;
+  if (eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
   store_.mapper.dropWindow(*oldest, DropReason::kOverload);
   return true;
 }

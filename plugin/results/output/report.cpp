@@ -208,14 +208,14 @@ std::uint64_t peakMemoryBytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
 }
 
-void describePoints(const MapCloud& cloud, MapReport& report) {
+void describePoints(const MapCloud& cloud, RunReport& report) {
   constexpr double kFar = 0.001;
   report.points = cloud.size();
   report.extent = extentOf(cloud);
   report.most_extent = extentOf(cloud, kFar);
 }
 
-std::string reportJson(const MapReport& report) {
+std::string reportJson(const RunReport& report) {
   const MapperCounts& counts = report.counts;
   const SpaceSweepOptions& sweep = report.options.mapper.keyframe.sweep;
 
@@ -335,7 +335,7 @@ std::string eventsText(const EventCounts& counts) {
   return text;
 }
 
-std::string timeLine(const MapReport& report) {
+std::string timeLine(const RunReport& report) {
   std::string text = shortDurationText(report.times.real.total);
   if (report.recording_s > 0) {
     text += " for " + shortDurationText(report.recording_s) + " of recording";
@@ -362,7 +362,7 @@ std::string shiftText(const PoseShift& shift) {
       shift.max_rad / kRadiansPerDegree);
 }
 
-std::string filesText(const MapReport& report, OutputKind kind,
+std::string filesText(const RunReport& report, OutputKind kind,
                       const std::filesystem::path& folder) {
   if (kind == OutputKind::kDepth) {
     return folder.string() + ": points.pcd, depth.tiff, depth.png, report.json";
@@ -373,7 +373,7 @@ std::string filesText(const MapReport& report, OutputKind kind,
 
 }  // namespace
 
-std::string summaryOf(const MapReport& report, OutputKind kind,
+std::string summaryOf(const RunReport& report, OutputKind kind,
                       const std::filesystem::path& folder) {
   std::string text;
   if (report.quality.word != QualityWord::kUnknown) {

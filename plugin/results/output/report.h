@@ -47,7 +47,7 @@ PoseShift shiftBetween(const std::vector<StampedPose>& before,
                        const std::vector<StampedPose>& after);
 
 /// The counts, times and options of a run: the content of report.json.
-struct MapReport {
+struct RunReport {
   std::vector<std::string> recording;  ///< Absolute names of the recording's files.
   MapperCounts counts;
   std::vector<std::uint64_t> silent_keyframes;  ///< Keyframes without events of a camera.
@@ -81,7 +81,7 @@ struct MapReport {
 };
 
 /// Writes the number of points and their extents into the report.
-void describePoints(const MapCloud& cloud, MapReport& report);
+void describePoints(const MapCloud& cloud, RunReport& report);
 
 /// Returns the report as indented JSON: schema (1), events (total and per camera; read = used +
 /// without_pose + outside_window + late + dropped + unselected + filtered + outside_lens +
@@ -102,7 +102,7 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// known, left_out, reasons, keyframes, much_worse), recording (the files), perturbation (the
 /// faults of the poses, if any), chosen (the automatic options: key, value and reason), options
 /// (all options with the used values) and version. Bytes of names that are not UTF-8 become U+FFFD.
-std::string reportJson(const MapReport& report);
+std::string reportJson(const RunReport& report);
 
 /// Return lists of objects with the keys of the report: key, value and reason; name and text.
 nlohmann::ordered_json asJson(const std::vector<ChosenOption>& chosen);
@@ -115,7 +115,7 @@ std::uint64_t peakMemoryBytes();
 /// fact that is not known or does not apply has no line.
 /// @param kind `kDepth`: the result is one keyframe.
 /// @param folder the folder with the results.
-std::string summaryOf(const MapReport& report, OutputKind kind,
+std::string summaryOf(const RunReport& report, OutputKind kind,
                       const std::filesystem::path& folder);
 
 }  // namespace efm

@@ -60,6 +60,8 @@ struct Kinds {
   bool depth = true;
 };
 
+Kinds kindsOf(OutputKind kind) { return {kind == OutputKind::kMap, kind == OutputKind::kDepth}; }
+
 /// The folders of a result, by what they may hold.
 enum class Level { kResult, kKeyframes, kKeyframe, kCamera };
 
@@ -122,7 +124,7 @@ ResultFiles filesIn(const fs::path& folder, Kinds kinds = {}) {
 /// Returns the kinds whose files a new result replaces: without an earlier result its own alone.
 Kinds replacedIn(const fs::path& target, OutputKind kind) {
   if (ResultFolder::earlierResult(target)) return {};
-  return {kind == OutputKind::kMap, kind == OutputKind::kDepth};
+  return kindsOf(kind);
 }
 
 /// Removes the empty ones among the folders of a result.
@@ -184,7 +186,7 @@ bool hasReport(const fs::path& folder) { return fs::exists(folder / kReport); }
 Kinds kindsOf(const fs::path& partial) {
   std::string name;
   std::ifstream(partial / kLock) >> name;
-  return {name != "depth", name == "depth"};
+  return kindsOf(name == "depth" ? OutputKind::kDepth : OutputKind::kMap);
 }
 
 /// Gives an earlier result its place back, if a run ended while it replaced the result.
@@ -371,7 +373,7 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   if (::access(places.target.c_str(), W_OK | X_OK) != 0) {
     throw std::runtime_error("cannot write into " + out.string() + ": " + std::strerror(errno));
   }
-  rejectInTheWay(places.target, {kind == OutputKind::kMap, kind == OutputKind::kDepth});
+  rejectInTheWay(places.target, kindsOf(kind));
   if (force) return;
   const auto has = [&](std::string_view name) { return fs::exists(places.target / name); };
   const bool has_map = has(kKeyframes) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);

@@ -14,8 +14,8 @@ namespace {
 
 using nlohmann::json;
 
-MapReport smallReport() {
-  MapReport report;
+RunReport smallReport() {
+  RunReport report;
   report.counts.cameras = {{10, 6, 1, 1, 1, 0, 0, 1}, {5, 5}};
   report.counts.event_uses = 20;
   report.counts.votes = {1500, 400, 100};
@@ -28,7 +28,7 @@ MapReport smallReport() {
 }
 
 TEST(Report, ListsThePerturbationOfPoses) {
-  MapReport report = smallReport();
+  RunReport report = smallReport();
   EXPECT_FALSE(json::parse(reportJson(report)).contains("perturbation"));
   report.faults.latency_ns = 200'000'000;
   report.faults.perturbation.seed = 9;
@@ -55,7 +55,7 @@ void expectKeys(const json& written, const char* expected) {
 }
 
 TEST(Report, EveryCountHasItsOwnKey) {
-  MapReport report = smallReport();
+  RunReport report = smallReport();
   MapperCounts& counts = report.counts;
   counts.cameras = {{96, 11, 7, 8, 12, 9, 15, 10, 6, 18}};
   counts.keyframes_without_pose = 12;
@@ -91,7 +91,7 @@ TEST(Report, EveryCountHasItsOwnKey) {
 }
 
 TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
-  MapReport report = smallReport();
+  RunReport report = smallReport();
   EXPECT_FALSE(json::parse(reportJson(report)).contains("refinement"));
   report.refinement.emplace();
   report.refinement->counts = {1, 2, 3, 4, 5};
@@ -115,7 +115,7 @@ TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
 }
 
 TEST(Report, OptionsHaveTheKeysOfFilesAndTheirTypes) {
-  const MapReport report = smallReport();
+  const RunReport report = smallReport();
   const json written = json::parse(reportJson(report));
   for (const char* key : {"kernel", "threads", "version"}) EXPECT_TRUE(written.contains(key));
   const json options = written["options"];
@@ -132,8 +132,8 @@ TEST(Report, OptionsHaveTheKeysOfFilesAndTheirTypes) {
 
 TEST(Report, PeakMemoryIsThatOfAProcess) { EXPECT_GT(peakMemoryBytes(), 1U << 20); }
 
-MapReport usualReport() {
-  MapReport report;
+RunReport usualReport() {
+  RunReport report;
   report.counts.cameras.resize(1);
   report.counts.cameras[0].read = 1000;
   report.counts.cameras[0][EventFate::kUsed] = 1000;
@@ -164,48 +164,48 @@ TEST(Summary, OfADepthMapHasNoKeyframesAndItsOwnFiles) {
 }
 
 TEST(Summary, EachFactHasItsLine) {
-  const std::pair<std::function<void(MapReport&)>, const char*> cases[] = {
-      {[](MapReport& report) {
+  const std::pair<std::function<void(RunReport&)>, const char*> cases[] = {
+      {[](RunReport& report) {
          report.most_extent = MapExtent{{-1.2, 0, -100}, {3.054, 0.5, -99.5}};
          report.extent = MapExtent{{-9, -9, -900}, {9, 9, 900}};
        },
        "extent      4.25 x 0.50 x 0.50 m: x -1.20 to 3.05, y 0.00 to 0.50, z -100.00 to -99.50\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.counts.cameras[0] = {12'345'678, 0, 0, 12'345'678};
        },
        "events      under 0.1 % of 12.3 million used; 100.0 % outside the keyframes' windows\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.counts.cameras[0] = {1000, 400, 10, 20, 25, 30, 15, 40, 160, 300};
        },
        "events      40.0 % of 1000 used; 2.0 % outside the keyframes' windows, 1.0 % without a "
        "pose, 4.0 % filtered as noise, 30.0 % over max_events_per_camera, 2.5 % too late, 3.0 % in "
        "dropped windows, 1.5 % of cameras that are not selected, 16.0 % outside the lens model\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.counts.cameras.push_back(report.counts.cameras[0]);
          report.counts.cameras[1][EventFate::kUsed] = 0;
        },
        "events      50.0 % of 2000 used\n"},
-      {[](MapReport& report) { report.stopped_at = 0.432; },
+      {[](RunReport& report) { report.stopped_at = 0.432; },
        "time        21 s for 1:00 min of recording, stopped at 43 %; at most 812 MB of memory\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.times.real.total = 0.44;
          report.recording_s = 7200;
        },
        "time        0.4 s for 02:00 h of recording; at most 812 MB of memory\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.pose_shift = PoseShift{0.012, 0.5, M_PI / 180, M_PI / 18};
        },
        "refinement  moved the poses by 1.20 cm and 1.00 degrees (median), at most 50.00 cm and "
        "10.00 degrees\n"},
-      {[](MapReport& report) { report.refinement.emplace(); },
+      {[](RunReport& report) { report.refinement.emplace(); },
        "results     out: map.html, map.pcd, keyframes/*/depth.png, trajectory.txt, "
        "trajectory_tracker.txt, report.json\n"},
-      {[](MapReport& report) {
+      {[](RunReport& report) {
          report.warnings = {{"a", "b"}, {"c", "d"}};
        },
        "warnings    2, on stderr and in report.json\n"}};
   for (const auto& [change, line] : cases) {
-    MapReport report = usualReport();
+    RunReport report = usualReport();
     change(report);
     EXPECT_THAT(summaryOf(report, OutputKind::kMap, "out"), testing::HasSubstr(line));
   }
@@ -225,7 +225,7 @@ TEST(Summary, MeasuresOfTheMapAreItsBoxAndThePosesShift) {
     const bool is_far = i == 700 || i == 1400;
     points.push_back({{i - 500.0, is_far ? 1e4 : 0.001 * i, is_far ? -1e4 : 5}, 1});
   }
-  MapReport report;
+  RunReport report;
   describePoints(*mapCloudOf(points, 0.01), report);
   EXPECT_EQ(report.points, 2001U);
   EXPECT_EQ(report.extent->max_m, Eigen::Vector3d(1500, 1e4, 5));

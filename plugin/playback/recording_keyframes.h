@@ -34,7 +34,7 @@ struct FirstPass {
 /// recording is played at the speed of the sensor.
 ///
 /// If the recording is damaged, the data before the damage are mapped.
-class MappingRun {
+class RecordingKeyframes {
  public:
   struct Host {
     /// Returns whether the recording is to end here. May be empty; its exceptions end the run.
@@ -46,8 +46,8 @@ class MappingRun {
   /// @param recording must live longer than this object.
   /// @param activity its name in the progress.
   /// @throws std::invalid_argument if the options are not valid.
-  MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
-             Verbosity verbosity, Host host, const std::string& activity = "mapping");
+  RecordingKeyframes(Recording& recording, const EventFusionOptions& options, FirstPass first,
+                     Verbosity verbosity, Host host, const std::string& activity = "mapping");
 
   /// Maps the recording until a keyframe is made.
   /// @return std::nullopt at the end, after an error, or if the host stopped.
@@ -64,7 +64,7 @@ class MappingRun {
   const std::optional<UserError>& error() const { return error_; }
   /// Adds the results of the run to a report that has the warnings and doubts of the first look.
   /// Call it once, after the last keyframe.
-  void describe(MapReport& report);
+  void describe(RunReport& report);
 
  private:
   template <typename Step>

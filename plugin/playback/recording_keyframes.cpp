@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/playback/mapping_run.h"
+#include "plugin/playback/recording_keyframes.h"
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
@@ -14,8 +14,9 @@
 
 namespace efm {
 
-MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, FirstPass first,
-                       Verbosity verbosity, Host host, const std::string& activity)
+RecordingKeyframes::RecordingKeyframes(Recording& recording, const EventFusionOptions& options,
+                                       FirstPass first, Verbosity verbosity, Host host,
+                                       const std::string& activity)
     : recording_(recording),
       options_(options),
       first_(std::move(first)),
@@ -45,7 +46,7 @@ MappingRun::MappingRun(Recording& recording, const EventFusionOptions& options, 
 /// begins with its position in the recording, and an OptionError without a section is about the
 /// input, not about options. @return false if the step throws.
 template <typename Step>
-bool MappingRun::attempt(const Step& step, bool is_input) {
+bool RecordingKeyframes::attempt(const Step& step, bool is_input) {
   try {
     step();
     return true;
@@ -59,7 +60,7 @@ bool MappingRun::attempt(const Step& step, bool is_input) {
   }
 }
 
-std::optional<KeyframeDepthMap> MappingRun::next() {
+std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
   while (true) {
     std::optional<KeyframeDepthMap> made;
     const bool maps = attempt([&] { made = options_.live.enabled ? takeMade() : mapper_->next(); });
@@ -81,7 +82,7 @@ std::optional<KeyframeDepthMap> MappingRun::next() {
 }
 
 /// Takes the first keyframe that waits, in live operation.
-std::optional<KeyframeDepthMap> MappingRun::takeMade() {
+std::optional<KeyframeDepthMap> RecordingKeyframes::takeMade() {
   const std::lock_guard<std::mutex> lock(made_mutex_);
   if (made_.empty()) return std::nullopt;
   std::optional<KeyframeDepthMap> first(std::move(made_.front()));
@@ -90,7 +91,7 @@ std::optional<KeyframeDepthMap> MappingRun::takeMade() {
 }
 
 /// @return false at the end of the recording, or after an error.
-bool MappingRun::feedNext() {
+bool RecordingKeyframes::feedNext() {
   std::optional<Sample> sample;
   const bool is_read = attempt([&] {
     const StageScope scope(&reading_, &StageSeconds::read, Processors::kThis);
@@ -106,7 +107,7 @@ bool MappingRun::feedNext() {
   return attempt([&] { mapper_->add(std::move(*sample)); }, true);
 }
 
-void MappingRun::waitForTimeOf(const Sample& sample) {
+void RecordingKeyframes::waitForTimeOf(const Sample& sample) {
   std::int64_t t_ns = 0;
   if (const auto* pose = std::get_if<PoseSample>(&sample)) {
     t_ns = pose->t_ns;
@@ -122,7 +123,7 @@ void MappingRun::waitForTimeOf(const Sample& sample) {
   std::this_thread::sleep_until(began_ + std::chrono::nanoseconds(t_ns - *first_ns_));
 }
 
-WatchedMap MappingRun::watched(const KeyframeDepthMap& newest, double watched_s) const {
+WatchedMap RecordingKeyframes::watched(const KeyframeDepthMap& newest, double watched_s) const {
   const SessionStatus status = mapper_->status();
   const auto map = mapper_->newest(true);
   const double seconds = std::max(progress_.seconds() - watched_s, 1e-3);
@@ -140,7 +141,7 @@ WatchedMap MappingRun::watched(const KeyframeDepthMap& newest, double watched_s)
   return watched;
 }
 
-void MappingRun::showProgress() {
+void RecordingKeyframes::showProgress() {
   const SessionStatus status = mapper_->status();
   const double seconds = std::max(progress_.seconds(), 1e-3);
   std::string details =
@@ -155,7 +156,7 @@ void MappingRun::showProgress() {
 }
 
 /// Computed from the events' time if its end is known, otherwise from the input.
-double MappingRun::fraction() const {
+double RecordingKeyframes::fraction() const {
   const TimeLimits limits = options_.mapper.interval();
   if (!limits.t1_ns) return recording_.progress();
   const std::optional<TimeSpan> events = mapper_->status().events;
@@ -167,7 +168,7 @@ double MappingRun::fraction() const {
 }
 
 /// Returns the line of a keyframe for --verbose: its contents, and the times of its stages.
-std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
+std::string RecordingKeyframes::keyframeLine(const KeyframeDepthMap& keyframe) {
   const SessionStatus status = mapper_->status();
   const StageSeconds& now = status.times.real;
   const StageSeconds before = std::exchange(reported_, now);
@@ -185,7 +186,7 @@ std::string MappingRun::keyframeLine(const KeyframeDepthMap& keyframe) {
 namespace {
 
 /// Reports the reference view and the shortest baseline, for disparities.
-void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport& report) {
+void describeView(const Rig& rig, const FusionMapperOptions& options, RunReport& report) {
   const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
   if (reference >= rig.cameras.size()) return;
   report.view = makeReferenceView(rig.cameras[reference].model, options.keyframe.view);
@@ -199,7 +200,7 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
 
 }  // namespace
 
-void MappingRun::describe(MapReport& report) {
+void RecordingKeyframes::describe(RunReport& report) {
   SessionStatus status = mapper_->status();
   const RecordingCounts read = recording_.counts();
   const FusionMapperOptions& options = options_.mapper;
