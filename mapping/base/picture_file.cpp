@@ -290,11 +290,10 @@ std::string encodePng(const cv::Mat& picture, PngPacking packing) {
   const PngCodec codec = pngCodec(SPNG_CTX_ENCODER);
   spng_ctx* const png = codec.get();
   const bool grey = picture.channels() == 1;
-  const bool runs = packing == PngPacking::kRuns;
   spng_set_option(png, SPNG_ENCODE_TO_BUFFER, 1);
   spng_set_option(png, SPNG_IMG_COMPRESSION_LEVEL, packing == PngPacking::kSmall ? 6 : 1);
-  spng_set_option(png, SPNG_IMG_COMPRESSION_STRATEGY, runs ? Z_RLE : Z_DEFAULT_STRATEGY);
-  if (runs) spng_set_option(png, SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_SUB);
+  spng_set_option(png, SPNG_IMG_COMPRESSION_STRATEGY, Z_DEFAULT_STRATEGY);
+  spng_set_option(png, SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_NONE);
   spng_ihdr header{};
   header.width = static_cast<std::uint32_t>(picture.cols);
   header.height = static_cast<std::uint32_t>(picture.rows);

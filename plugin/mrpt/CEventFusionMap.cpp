@@ -196,14 +196,6 @@ std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map) {
   return keyframes;
 }
 
-void writeSimpleMap(const std::filesystem::path& file,
-                    const std::vector<StoredKeyframe>& keyframes) {
-  mrpt::maps::CSimpleMap map;
-  for (const StoredKeyframe& keyframe : keyframes) insertInto(map, keyframe, cloudOf(keyframe));
-  if (map.saveToFile(file.string())) return;
-  throw std::runtime_error("the file cannot be created or the disk is full");
-}
-
 using mrpt::maps::CSimplePointsMap;
 using mrpt::serialization::CArchive;
 

@@ -37,9 +37,6 @@ void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
                 const mrpt::maps::CPointsMapXYZI::Ptr& cloud);
 /// Returns the keyframes of a simplemap. A frame may have several keyframes.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
-/// Writes a simplemap of keyframes.
-void writeSimpleMap(const std::filesystem::path& file,
-                    const std::vector<StoredKeyframe>& keyframes);
 
 /// The global cloud as a metric map of MRPT. MRPT's map factory makes the map from an .ini. The map
 /// takes the keyframes' clouds of a simplemap, and it can be stored and drawn. Not thread-safe.

@@ -21,9 +21,6 @@
 
 namespace efm {
 
-/// MRPT's clock counts ticks of 100 ns since 1601. The recording's clock is taken as Unix time.
-inline constexpr std::int64_t kMrptTicksAtUnixEpoch = 116'444'736'000'000'000;
-
 /// Returns the nearest tick, at most 50 ns away.
 inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
   return mrpt::Clock::time_point(

@@ -14,9 +14,9 @@
 #include "plugin/engine/first_look.h"
 #include "plugin/engine/host_text.h"
 #include "plugin/playback/output_checks.h"
-#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
+#include "plugin/results/output/simple_map.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/map_picture.h"
 #include "plugin/results/pictures/picture.h"
@@ -139,7 +139,8 @@ void warnOfReplacement(Job& job) {
 /// The first look at a recording.
 struct Look {
   FirstPass first;
-  std::unique_ptr<Recording> recording;  ///< The recording again, from its begin.
+  std::unique_ptr<Recording> recording;         ///< The recording again, from its begin.
+  std::vector<UndistortionTable> undistortion;  ///< The mapping shares these tables.
 };
 
 /// Takes the first look: chooses the automatic options, and warns of poses that do not explain the
@@ -178,7 +179,9 @@ Look lookAt(Job& job) {
   }
   if (takes) held->end();
 
-  auto [mapper, choice, verdict] = chooseAndJudge(samples.finish(), options);
+  RecordingSurvey survey = samples.finish();
+  auto [mapper, choice, verdict] = chooseAndJudge(survey, options);
+  look.undistortion = std::move(survey.undistortion);
   options.mapper = std::move(mapper);
   std::vector<std::string> doubts;
   if (options.automatic.any()) {
@@ -384,21 +387,6 @@ class DsiReceiver : public DsiSink {
   std::unique_ptr<NpyDsiFile> file_;
 };
 
-/// Writes map.simplemap. Without MRPT, gives a note instead.
-void writeSimpleMap(const Job& job, const MapOutput& output,
-                    const std::vector<StoredKeyframe>& keyframes) {
-  const MrptLibrary* library = nullptr;
-  try {
-    library = &mrptLibrary("map.simplemap");
-  } catch (const std::runtime_error& error) {
-    if (job.note) job.note(std::string(error.what()) + "; the file is left out");
-    return;
-  }
-  output.writeFile("map.simplemap", [&](const std::filesystem::path& file) {
-    library->writeSimpleMap(file, keyframes);
-  });
-}
-
 /// Writes the files of a map, except its page and its report.
 void writeMap(Job& job, const MapOutput& output, const MapSnapshot& map,
               const KeyframeSheet& sheet) {
@@ -409,7 +397,11 @@ void writeMap(Job& job, const MapOutput& output, const MapSnapshot& map,
       output.writeColouredCloud(*map.points, upwardOf(map.trajectory), map.trajectory);
     });
   }
-  write(job, [&] { writeSimpleMap(job, output, map.keyframes); });
+  write(job, [&] {
+    output.writeFile("map.simplemap", [&](const std::filesystem::path& file) {
+      writeSimpleMap(file, map.keyframes);
+    });
+  });
   write(job, [&] { output.writeTrajectory("trajectory.txt", map.trajectory); });
   if (options.refinement.enabled) {
     write(job, [&] { output.writeTrajectory("trajectory_tracker.txt", map.tracker_trajectory); });

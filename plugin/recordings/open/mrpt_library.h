@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/sample.h"
@@ -12,7 +11,6 @@
 namespace efm {
 
 class MapWatcher;
-struct StoredKeyframe;
 
 class RawlogWriter {
  public:
@@ -33,8 +31,6 @@ struct MrptLibrary {
   std::unique_ptr<RawlogWriter> (*writeRawlog)(const std::filesystem::path& file,
                                                RawlogCompression compression,
                                                const Recording& recording);
-  void (*writeSimpleMap)(const std::filesystem::path& file,
-                         const std::vector<StoredKeyframe>& keyframes);
   /// See `recordFrames` (plugin/mrpt/window/map_scene.h).
   std::unique_ptr<MapWatcher> (*recordFrames)(const std::filesystem::path& folder, bool force);
 };

@@ -207,7 +207,6 @@ void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& 
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
   KeyframePicture added;
   const cv::Mat1f reduced_m = reducedDepth(depth_m, kMaxWidth);
-  // kSmall needs half the size of kRuns, and 2 ms per picture instead of 0.7 ms.
   constexpr PngPacking kPacking = PngPacking::kSmall;
   added.depth = encodePng(depthPicture(reduced_m, limits_, Palette::kBrightToDark), kPacking);
   if (!events.empty()) added.events = encodePng(eventPicture(reduced(events, factor)), kPacking);

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/results/output/simple_map.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -72,6 +73,39 @@ CMultiMetricMap mapsFrom(const std::string& ini) {
   CMultiMetricMap maps;
   maps.setListOfMaps(list);
   return maps;
+}
+
+/// Returns an object as MRPT's archive.
+std::string archiveOf(const mrpt::serialization::CSerializable& object) {
+  std::vector<std::uint8_t> bytes;
+  mrpt::serialization::ObjectToOctetVector(&object, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+class SimpleMap : public TemporaryFolder {};
+
+TEST_F(SimpleMap, IsWhatMrptWritesAndReads) {
+  const std::vector<StoredKeyframe> keyframes = {randomKeyframe(1), randomKeyframe(2, 0),
+                                                 randomKeyframe(3, 1000)};
+  mrpt::maps::CSimpleMap by_mrpt;
+  for (const StoredKeyframe& keyframe : keyframes) insertInto(by_mrpt, keyframe, cloudOf(keyframe));
+  writeSimpleMap(folder() / "ours", keyframes);
+  mrpt::maps::CSimpleMap ours;
+  ASSERT_TRUE(ours.loadFromFile((folder() / "ours").string()));
+  ASSERT_EQ(ours.size(), keyframes.size());
+  // MRPT writes what it has read as we have written it.
+  EXPECT_EQ(archiveOf(ours), simpleMapArchive(keyframes));
+  // The rotation matrix of a quaternion is rounded in another way.
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    constexpr double kRounding = 1e-15;
+    const auto& [our_pose, our_frame] = *std::next(ours.begin(), static_cast<std::ptrdiff_t>(i));
+    const auto& [pose, frame] = *std::next(by_mrpt.begin(), static_cast<std::ptrdiff_t>(i));
+    EXPECT_EQ(archiveOf(*our_frame), archiveOf(*frame));
+    const auto difference =
+        our_pose->getMeanVal().getHomogeneousMatrixVal<mrpt::math::CMatrixDouble44>() -
+        pose->getMeanVal().getHomogeneousMatrixVal<mrpt::math::CMatrixDouble44>();
+    EXPECT_LE(difference.asEigen().cwiseAbs().maxCoeff(), kRounding);
+  }
 }
 
 TEST(CEventFusionMap, IsMadeByTheMapFactoryWithItsOptions) {
