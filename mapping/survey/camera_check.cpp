@@ -245,6 +245,7 @@ class OwnMaps {
     options.sweep.kernel = given.keyframe.sweep.kernel;
     options.split = SplitFusionOptions::none();
     options.extraction.extraction = method;
+    options.extraction.median_size = 1;  // of kPaper: its depths are not used
     options.extraction.min_probability = kMinProbability;
     return options;
   }

@@ -14,6 +14,8 @@ namespace {
 constexpr double kRigS = 0.05;    // seconds in which the rig hardly moves
 constexpr double kMotionS = 0.5;  // seconds in which the camera sees parallax
 constexpr std::size_t kMinPixels = 200;
+/// In coarser sweeps a tracker's errors look like a scale.
+constexpr Coarseness kFineSweep{240, 100'000};
 constexpr double kWithin = 1.15;
 
 /// Appends the ratios of the two depths at the pixels where both maps have a depth.
@@ -41,10 +43,10 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options) {
   if (selectedCameras(rig, options.cameras).size() < 2) return std::nullopt;
-  CoarseSweep rig_sweep(rig, options);
+  CoarseSweep rig_sweep(rig, options, kFineSweep);
   FusionMapperOptions reference = options;
   reference.cameras = {options.keyframe.reference_camera};
-  CoarseSweep motion_sweep(rig, reference);
+  CoarseSweep motion_sweep(rig, reference, kFineSweep);
   std::vector<double> ratios;
   for (const WindowSample& sample : samples) {
     const auto by_rig = rig_sweep.map(middleOf(sample, kRigS));

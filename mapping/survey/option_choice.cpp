@@ -242,8 +242,6 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
                                "the default: no event has a pose");
   }
   Coarseness coarseness;
-  // Blurred windows have other depths: a tracker's errors must not choose the options.
-  coarseness.correct_motion = options.keyframe.motion.correct_motion;
   if (!automatic.min_depth_m) {
     coarseness.nearest_m = std::min(coarseness.nearest_m, given.min_depth_m);
   }

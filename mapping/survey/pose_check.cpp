@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <iomanip>
 #include <locale>
+#include <map>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -51,6 +52,7 @@ constexpr double kMinShortShiftGain = 1.05;  // in less time than that, or witho
 constexpr double kMinPixelGain = 1.03;
 constexpr double kMinPixelGainOfOne = 1.1;
 constexpr double kHopeless = 0.7;        // gain of a piece: other pieces are not tried
+constexpr double kHopelessShift = 0.92;  // the same of a clock, of the best clock's gain
 constexpr double kMaxOtherPixels = 0.9;  // the pixels are right
 constexpr double kMinShiftS = 0.005;     // smallest shift that is reported
 // Gain of the best poses over typical wrong poses; less for clocks, which change little.
@@ -59,6 +61,10 @@ constexpr double kMinShiftDistinction = 1.45;
 // Right poses: typical wrong poses are at most 0.75 times as sharp, and none is sharper. In several
 // windows of several cameras it is a fault.
 constexpr double kMaxTypicalWrong = 0.8;
+// Clearly right poses: some hypotheses are enough, and no mirror or far clock is tried.
+constexpr double kMaxTypicalClear = 0.75;
+constexpr double kMaxBestClear = 0.95;
+constexpr double kMaxBesideClear = 0.97;  // of the clocks kClockS beside
 constexpr double kMinSeenS = 0.5;
 constexpr double kMinMargin = 1.02;     // of the best mistake over the next one
 constexpr double kEqual = 0.93;         // of the best gain, in each half of the data
@@ -142,23 +148,34 @@ class PoseCheck {
   };
 
   void comparePoses() {
-    // The first half of the pieces excludes most hypotheses.
-    constexpr double kPromising = 1.05;
+    // Poses that are much sharper than with a third of the axes are right: the others are not
+    // tried.
+    const auto isFirst = [](std::size_t i) { return i < 2 || i % 3 == 2; };
+    const std::vector<PoseHypothesis> hypotheses = poseHypotheses();
     std::vector<double> wrong;
-    for (const PoseHypothesis& hypothesis : poseHypotheses()) {
-      PoseFinding finding{hypothesis.mistake};
-      finding.R_body_rig = hypothesis.R_body_rig;
-      const auto sharpness = [&](const SamplePiece& piece) {
-        const auto moved = [&](const StampedPose& pose) {
-          return hypothesis.T_world_rig(pose.T_world_rig);
-        };
-        const Window& window = piece.window;
-        return sharpness_.of(piece, piece.trajectory.moved(window.t0_ns, window.t1_ns, moved));
-      };
-      wrong.push_back(compare(finding, sharpness, kPromising).mean());
-      best_wrong_ = std::max(best_wrong_, wrong.back());
+    for (const bool first : {true, false}) {
+      if (!first && areClear()) return;
+      for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+        if (isFirst(i) != first) continue;
+        wrong.push_back(gainOf(hypotheses[i]));
+        best_wrong_ = std::max(best_wrong_, wrong.back());
+      }
+      typical_wrong_ = upperMedian(wrong);
     }
-    typical_wrong_ = upperMedian(wrong);
+  }
+
+  double gainOf(const PoseHypothesis& hypothesis) {
+    constexpr double kPromising = 1.05;  // the first half of the pieces excludes most hypotheses
+    PoseFinding finding{hypothesis.mistake};
+    finding.R_body_rig = hypothesis.R_body_rig;
+    const auto sharpness = [&](const SamplePiece& piece) {
+      const auto moved = [&](const StampedPose& pose) {
+        return hypothesis.T_world_rig(pose.T_world_rig);
+      };
+      const Window& window = piece.window;
+      return sharpness_.of(piece, piece.trajectory.moved(window.t0_ns, window.t1_ns, moved));
+    };
+    return compare(finding, sharpness, kPromising).mean();
   }
 
   void compareCameras() {
@@ -186,31 +203,37 @@ class PoseCheck {
   }
 
   /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
-  Gains gainsOfShift(double shift_s, std::size_t count) {
+  /// @param least the rest is left out if the first ones have less.
+  Gains gainsOfShift(double shift_s, std::size_t count, double least = 0) {
     Gains gains;
     const std::int64_t shift_ns = durationFromSeconds(shift_s);
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < count && (i == 0 || gains.mean() >= least); ++i) {
       const SamplePiece& piece = pieces_[i];
       const std::vector<StampedPose>& poses = piece.trajectory.poses();
       if (poses.front().t_ns > piece.window.t0_ns + shift_ns ||
           poses.back().t_ns < piece.window.t1_ns + shift_ns) {
         continue;
       }
-      Trajectory moved(options_.trajectory);
-      for (const StampedPose& pose : poses) moved.add({pose.t_ns - shift_ns, pose.T_world_rig});
-      gains.add(sharpness_.of(piece, moved), as_given_[i]);
+      auto known = shifted_.find({shift_ns, i});
+      if (known == shifted_.end()) {
+        Trajectory moved(options_.trajectory);
+        for (const StampedPose& pose : poses) moved.add({pose.t_ns - shift_ns, pose.T_world_rig});
+        const double sharpness = shift_ns == 0 ? as_given_[i] : sharpness_.of(piece, moved);
+        known = shifted_.emplace(std::pair(shift_ns, i), sharpness).first;
+      }
+      gains.add(known->second, as_given_[i]);
     }
     return gains;
   }
 
   /// Searches the best time shift on the first half of the pieces, from coarse to fine.
-  /// @param gains of a shift.
+  /// @param gainsOf (shift, least gain) returns the gains of a shift, fewer if they are less.
   template <typename GainsOf>
   double bestShift(const std::vector<double>& shifts_s, GainsOf gainsOf) const {
     double best_s = 0;
     double best_gain = 1;
     const auto attempt = [&](double shift_s) {
-      const Gains gains = gainsOf(shift_s);
+      const Gains gains = gainsOf(shift_s, kHopelessShift * best_gain);
       if (gains.logs.size() < half() || gains.mean() <= best_gain) return;
       best_s = shift_s;
       best_gain = gains.mean();
@@ -231,11 +254,18 @@ class PoseCheck {
 
   void compareTimes() {
     std::vector<double> shifts_s;
-    for (int part = 2; part <= 8; part *= 2) shifts_s.push_back(kTimeStepS / part);
-    for (double s = kTimeStepS; s <= kMaxTimeShiftS; s += (s < 0.2 ? 1 : 2) * kTimeStepS) {
-      shifts_s.push_back(s);
+    for (int part = 1; part <= 8; part *= 2) shifts_s.push_back(kTimeStepS / part);
+    const auto isWorse = [&](double s) {
+      const Gains gains = gainsOfShift(s, half());
+      return !gains.logs.empty() && gains.mean() < kMaxBesideClear;
+    };
+    if (!(areClear() && isWorse(kClockS) && isWorse(-kClockS))) {
+      for (double s = 2 * kTimeStepS; s <= kMaxTimeShiftS; s += (s < 0.2 ? 1 : 2) * kTimeStepS) {
+        shifts_s.push_back(s);
+      }
     }
-    const double best_s = bestShift(shifts_s, [&](double s) { return gainsOfShift(s, half()); });
+    const double best_s =
+        bestShift(shifts_s, [&](double s, double least) { return gainsOfShift(s, half(), least); });
     const auto gainsOf = [&](double s) {
       Gains gains = gainsOfShift(s, pieces_.size());
       if (4 * gains.logs.size() < 3 * pieces_.size()) gains.logs.clear();
@@ -271,16 +301,16 @@ class PoseCheck {
       candidate.finding.mistake = PoseMistake::kCameraClock;
       const auto camera = static_cast<std::size_t>(cameras[i]);
       candidate.finding.camera = camera;
-      const auto gainsOf = [&](double shift_s, std::size_t count) {
+      const auto gainsOf = [&](double shift_s, std::size_t count, double least = 0) {
         Gains gains;
-        for (std::size_t k = 0; k < count; ++k) {
+        for (std::size_t k = 0; k < count && (k == 0 || gains.mean() >= least); ++k) {
           SamplePiece piece = pieces_[k];
           for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(shift_s);
           gains.add(sharpness_.of(piece, piece.trajectory), as_given_[k]);
         }
         return gains;
       };
-      const auto ofHalf = [&](double shift_s) { return gainsOf(shift_s, half()); };
+      const auto ofHalf = [&](double s, double least) { return gainsOf(s, half(), least); };
       if (bestShift({0.03}, ofHalf) == 0) continue;
       candidate.finding.shift_s = bestShift({0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15}, ofHalf);
       candidate.gains = gainsOf(candidate.finding.shift_s, pieces_.size());
@@ -313,6 +343,7 @@ class PoseCheck {
 
   /// Compares mirrored pictures of all cameras.
   void compareMirrors() {
+    if (severalCameras() && areClear()) return;
     for (const PixelChange& change :
          {PixelChange{false, true}, PixelChange{false, false, true}, PixelChange{true}}) {
       PoseFinding finding{PoseMistake::kMirrored};
@@ -483,6 +514,9 @@ class PoseCheck {
   }
   /// Returns whether the poses explain the events better than wrong poses do.
   bool areExplained() const { return typical_wrong_ <= kMaxTypicalWrong && best_wrong_ <= 1; }
+  bool areClear() const {  // after comparePoses
+    return typical_wrong_ <= kMaxTypicalClear && best_wrong_ <= kMaxBestClear;
+  }
   bool severalCameras() const { return selectedCameras(rig_, options_.cameras).size() > 1; }
   /// Returns the number of pieces on which mistakes are chosen. The others verify them.
   std::size_t half() const { return (pieces_.size() + 1) / 2; }
@@ -493,6 +527,7 @@ class PoseCheck {
   std::vector<SamplePiece> pieces_;
   std::vector<double> as_given_;  // of each piece
   std::vector<Candidate> candidates_;
+  std::map<std::pair<std::int64_t, std::size_t>, double> shifted_;  // by time shift and piece
   double typical_wrong_ = 0;  // the median gain of the hypotheses: at most one is right
   double best_wrong_ = 0;
   double best_shift_gain_ = 1;

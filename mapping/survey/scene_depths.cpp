@@ -176,10 +176,10 @@ FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
   coarse.max_events_per_camera = coarseness.events;
   coarse.extraction = {};
   coarse.extraction.extraction = coarseness.extraction;
+  coarse.extraction.median_size = 1;  // of kPaper: its depths are not used
   coarse.extraction.neighbours = false;
   coarse.extraction.min_probability = kCoarseProbability;
-  coarse.motion.correct_motion = coarseness.correct_motion;
-  coarse.motion.motion_rounds = 1;
+  coarse.motion.correct_motion = MotionCorrectionUse::kNever;
   coarse.camera_maps = false;
   coarse.event_images = false;
   coarse.view_events = false;

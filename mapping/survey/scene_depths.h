@@ -91,13 +91,11 @@ inline constexpr double kNearestSceneM = 0.1;
 
 /// The coarseness of a sweep. The default has enough pixels for the distribution of depths.
 struct Coarseness {
-  int width = 240;                 ///< Maximum width of the view, pixels.
-  std::uint32_t events = 100'000;  ///< Maximum number of events of each camera.
-  double plane_step_px = 1;        ///< Parallax between neighbouring planes, pixels.
+  int width = 160;                ///< Maximum width of the view, pixels.
+  std::uint32_t events = 40'000;  ///< Maximum number of events of each camera.
+  double plane_step_px = 1;       ///< Parallax between neighbouring planes, pixels.
   double nearest_m = kNearestSceneM;
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
-  /// The windows whose motion is corrected, in one round.
-  MotionCorrectionUse correct_motion = MotionCorrectionUse::kNever;
 };
 
 /// A coarse sweep of samples in a small view, over a wide range of depths that follows from the
