@@ -9,6 +9,7 @@ namespace efm {
 struct StageSeconds {
   double total = 0;   ///< The whole run.
   double read = 0;    ///< Reading the recording.
+  double look = 0;    ///< First look: choice of options, checks of poses and cameras.
   double rays = 0;    ///< Pose packets and back-projection.
   double sweep = 0;   ///< Votes and fusion.
   double depth = 0;   ///< Extraction of depth maps.

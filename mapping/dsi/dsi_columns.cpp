@@ -89,6 +89,23 @@ void TileVolume::setPlane(int plane, const PlaneValues& values) {
             values_.data() + static_cast<std::size_t>(plane) * pixels_);
 }
 
+void TileVolume::interpolate(const std::vector<bool>& known, std::size_t pixels) {
+  std::size_t before = 0;
+  for (std::size_t after = 1; after < known.size(); ++after) {
+    if (!known[after]) continue;
+    const float* first = plane(static_cast<int>(before));
+    const float* last = plane(static_cast<int>(after));
+    for (std::size_t at = before + 1; at < after; ++at) {
+      const float weight = static_cast<float>(at - before) / static_cast<float>(after - before);
+      float* values = values_.data() + at * pixels_;
+      for (std::size_t i = 0; i < pixels; ++i) {
+        values[i] = first[i] + weight * (last[i] - first[i]);
+      }
+    }
+    before = after;
+  }
+}
+
 DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confidence,
                                     const TileVolume& volume, int planes, int window) {
   Tile columns;

@@ -37,8 +37,12 @@ class RunningPeaks {
   /// @param kernel one of `availableKernels`; all kernels give the same bits.
   explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel());
 
-  /// Adds a plane. Planes are added in increasing order, without a gap.
+  /// Adds a plane. Planes are added in increasing order, without a gap; in any order if only the
+  /// confidence is needed.
   void add(int plane, const PlaneValues& values);
+  /// Return the largest value of each pixel, below 0 without a plane, and its plane.
+  const PlaneValues& confidence() const { return best_; }
+  const PixelValues<std::int32_t>& planes() const { return plane_; }
   /// Writes the tile, row by row, to its position in the images that are not empty. Several threads
   /// may write tiles that do not overlap.
   void writeTo(DsiPeaks& images, const cv::Rect& tile) const;
@@ -60,6 +64,9 @@ class TileVolume {
 
   bool empty() const { return values_.empty(); }
   void setPlane(int plane, const PlaneValues& values);
+  /// Sets the first `pixels` values of all other planes: interpolated between the planes before and
+  /// after. @param known one flag per plane; true for the first and the last plane.
+  void interpolate(const std::vector<bool>& known, std::size_t pixels);
   const float* plane(int plane) const {
     return values_.data() + static_cast<std::size_t>(plane) * pixels_;
   }

@@ -93,15 +93,18 @@ struct EventCounts {
 };
 
 /// Counts of votes. One vote is one used event on one plane:
-/// cast + outside_view + behind_camera = events x planes.
+/// cast + interpolated + outside_view + behind_camera = events x planes.
 struct VoteCounts {
   std::uint64_t cast = 0;
+  /// Votes on planes that tiles interpolate (`coarseStep`), as many as on the tiles' coarse planes.
+  std::uint64_t interpolated = 0;
   std::uint64_t outside_view = 0;   ///< Votes that have a neighbouring pixel outside the view.
   std::uint64_t behind_camera = 0;  ///< Votes whose point is behind the camera that saw the event.
 
-  std::uint64_t total() const { return cast + outside_view + behind_camera; }
+  std::uint64_t total() const { return cast + interpolated + outside_view + behind_camera; }
   VoteCounts& operator+=(const VoteCounts& other) {
     cast += other.cast;
+    interpolated += other.interpolated;
     outside_view += other.outside_view;
     behind_camera += other.behind_camera;
     return *this;

@@ -14,6 +14,7 @@
 #include "mapping/base/thread_arena.h"
 #include "mapping/events/event.h"
 #include "mapping/motion/slice_alignment.h"
+#include "mapping/sweep/plane_choice.h"
 
 namespace efm {
 
@@ -290,7 +291,7 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   SweepResult swept;
   {
     const StageScope scope(times, &StageSeconds::sweep);
-    swept = fuse(cameras, input.planes, sink);  // 4.
+    swept = fuse(cameras, input.planes, keyframe.parallax_px_m, sink);  // 4.
   }
   const StageScope scope(times, &StageSeconds::depth);
   extract(swept, cameras, input.planes, keyframe);  // 5.
@@ -321,7 +322,7 @@ FusionOptions KeyframeMapper::pairsOf(std::vector<WindowRays>& cameras) const {
 
 /// 4. Votes, and fuses the DSIs across cameras and time, plane by plane. Consumes the rays.
 SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
-                                 DsiSink* sink) const {
+                                 double parallax_px_m, DsiSink* sink) const {
   SpaceSweepOptions sweep = options_.sweep;
   sweep.fusion = pairsOf(cameras);
   const FusionLayout layout = groups_.layoutOf(static_cast<int>(cameras.size()));
@@ -337,6 +338,11 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPl
   const DepthExtractionOptions& extraction = options_.extraction;
   if (extraction.extraction == ExtractionMethod::kAggregated) {
     request.column_window = extraction.threshold_kernel;
+    if (sweep.coarse_to_fine && options_.planes.spacing == PlaneSpacing::kInverse) {
+      const double range_px =
+          parallax_px_m * (1 / planes.depth(0) - 1 / planes.depth(planes.size() - 1));
+      request.coarse_step = coarseStep(planes, view_, range_px);
+    }
   }
   return sweepSpace(std::move(rays), {view_, planes}, sweep, request);
 }

@@ -100,7 +100,7 @@ class KeyframeMapper {
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageTimes* times) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, const DepthPlanes& planes,
-                   DsiSink* sink) const;
+                   double parallax_px_m, DsiSink* sink) const;
   FusionOptions pairsOf(std::vector<WindowRays>& cameras) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                const DepthPlanes& planes, KeyframeDepthMap& keyframe) const;

@@ -18,6 +18,7 @@
 #include "mapping/base/thread_arena.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
+#include "mapping/sweep/plane_choice.h"
 #include "mapping/sweep/ray_bins.h"
 #include "mapping/sweep/tiles.h"
 
@@ -176,7 +177,8 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
-  std::vector<TilePeaks> cameras;  // empty if not requested
+  std::vector<TilePeaks> cameras;           // empty if not requested
+  std::vector<std::uint64_t> interpolated;  // per camera: see VoteCounts; in units
 };
 
 /// The whole DSI for a sink.
@@ -242,7 +244,8 @@ class TiledSweep {
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
     return {std::vector<TileRays>(rays_.inputs()),
             TileFusion(options_.fusion, inputs_, keep, kernel_), peaks,
-            std::vector<TilePeaks>(cameras_.size(), peaks)};
+            std::vector<TilePeaks>(cameras_.size(), peaks),
+            std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 
   /// Sweeps all planes on one tile.
@@ -251,25 +254,59 @@ class TiledSweep {
     scratch.fusion.moveTo(tile);
     scratch.fused.moveTo(tile.tile, kernel_);
     for (TilePeaks& camera : scratch.cameras) camera.moveTo(tile.tile, kernel_);
-    for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
-      for (std::size_t input = 0; input < rays_.inputs(); ++input) {
-        rays_.gather(group, input, tile, scratch.rays[input]);
-      }
-      const PlaneRange& planes = rays_.groups()[group];
-      for (int plane = planes.begin; plane < planes.end; ++plane) {
-        for (std::size_t input = 0; input < rays_.inputs(); ++input) {
-          rays_.gatherOn(plane, group, input, tile, scratch.rays[input]);
+    const bool all = request_.column_window == 0 || request_.coarse_step == 1;
+    const PlaneSet coarse = coarsePlanes(grid_.planes.size(), all ? 1 : request_.coarse_step);
+    const std::vector<std::uint64_t> before = scratch.fusion.units();
+    sweepPlanes(coarse, true, tile, scratch);
+    if (!all) {
+      const std::vector<std::uint64_t> after = scratch.fusion.units();
+      const PlaneSet fine =
+          planesAtEdges(coarse, scratch.fused.peaks(), tile.tile.size(), request_.column_window);
+      sweepPlanes(fine, true, tile, scratch);
+      PlaneSet added(coarse.size());
+      for (std::size_t i = 0; i < added.size(); ++i) added[i] = coarse[i] || fine[i];
+      scratch.fused.interpolate(added);
+      if (request_.sink != nullptr || !cameras_.empty()) {
+        added.flip();
+        sweepPlanes(added, false, tile, scratch);
+      } else {
+        const auto others =
+            static_cast<std::uint64_t>(std::count(added.begin(), added.end(), false));
+        const auto swept =
+            static_cast<std::uint64_t>(std::count(coarse.begin(), coarse.end(), true));
+        for (std::size_t c = 0; c < after.size(); ++c) {
+          scratch.interpolated[c] += others * (after[c] - before[c]) / swept;
         }
-        sweepPlane(plane, rays_.fromPixels(plane), tile.tile, scratch);
       }
     }
     scratch.fused.writeTo(fused_, t);
     for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
   }
 
-  void sweepPlane(int plane, double from_pixels, const cv::Rect& tile, Scratch& scratch) {
-    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, from_pixels);
-    scratch.fused.add(plane, fused);
+  /// Sweeps some planes on a tile. @param adds true: also to the peaks of the fused DSI.
+  void sweepPlanes(const PlaneSet& set, bool adds, const TileCells& tile, Scratch& scratch) {
+    for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
+      const PlaneRange& planes = rays_.groups()[group];
+      if (std::find(set.begin() + planes.begin, set.begin() + planes.end, true) ==
+          set.begin() + planes.end) {
+        continue;
+      }
+      for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+        rays_.gather(group, input, tile, scratch.rays[input]);
+      }
+      for (int plane = planes.begin; plane < planes.end; ++plane) {
+        if (!set[static_cast<std::size_t>(plane)]) continue;
+        for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+          rays_.gatherOn(plane, group, input, tile, scratch.rays[input]);
+        }
+        sweepPlane(plane, adds, tile.tile, scratch);
+      }
+    }
+  }
+
+  void sweepPlane(int plane, bool adds, const cv::Rect& tile, Scratch& scratch) {
+    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, rays_.fromPixels(plane));
+    if (adds) scratch.fused.add(plane, fused);
     for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
       scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));
     }
@@ -281,10 +318,16 @@ class TiledSweep {
     for (ViewPeaks& camera : cameras_) result.cameras.push_back(camera.sweptDsi());
     for (std::size_t c = 0; c < result.votes.size(); ++c) {
       std::uint64_t units = 0;
-      for (const Scratch& scratch : scratches_) units += scratch.fusion.units()[c];
-      const std::uint64_t cast = units >> kernels::kWeightBits;
-      result.votes[c].cast += cast;
-      result.votes[c].outside_view -= cast;
+      std::uint64_t interpolated = 0;
+      for (const Scratch& scratch : scratches_) {
+        units += scratch.fusion.units()[c];
+        interpolated += scratch.interpolated[c];
+      }
+      VoteCounts& votes = result.votes[c];
+      votes.cast += units >> kernels::kWeightBits;
+      votes.interpolated +=
+          std::min(interpolated >> kernels::kWeightBits, votes.outside_view - votes.cast);
+      votes.outside_view -= votes.cast + votes.interpolated;
     }
     return result;
   }

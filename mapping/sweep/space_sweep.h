@@ -20,11 +20,14 @@ struct SpaceSweepOptions {
   // For speed only. The number of threads never changes the result; kernels agree up to rounding.
   std::optional<int> threads;          ///< 1 to 1024; default: the number of cores.
   std::optional<VotingKernel> kernel;  ///< One of `availableKernels`; default: the fastest.
+  /// True: with columns, tiles do not sweep the planes between coarse planes where no edge lies.
+  bool coarse_to_fine = true;
 
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
     visit("threads", self.threads, Allowed::from(1, 1024, "1 to 1024"));
     visit("kernel", self.kernel);
+    visit("coarse_to_fine", self.coarse_to_fine);
   }
   void validate() const;
   /// Returns the number of threads that will run, at most the number of cores.
@@ -49,6 +52,10 @@ struct SweepRequest {
   /// Side of a Gaussian window in pixels: odd, at least 3; or 0 for no columns. Pixels get a column
   /// if their confidence is above its mean in the window. Peaks then have only the confidence.
   int column_window = 0;
+  /// With columns: see `coarseStep`. Each tile sweeps these planes first, then the planes between
+  /// them where its edges lie (`planesAtEdges`). The columns of the other planes are interpolated;
+  /// a sink and each camera's own peaks get all planes. The plain kernel sweeps all planes.
+  int coarse_step = 1;
 };
 
 /// @param groups a divisor of the number of slots (asserted).

@@ -178,10 +178,15 @@ class TilePeaks {
     tile_ = tile;
     peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
   }
-  /// Adds a plane. Planes are added in increasing order, without a gap.
+  /// Adds a plane. Planes are added in increasing order, without a gap; in any order with columns.
   void add(int plane, const PlaneValues& values) {
     peaks_->add(plane, values);
     if (!volume_.empty()) volume_.setPlane(plane, values);
+  }
+  const RunningPeaks& peaks() const { return *peaks_; }
+  /// Interpolates the planes that were not added. Needs columns. @param added one flag per plane.
+  void interpolate(const std::vector<bool>& added) {
+    volume_.interpolate(added, static_cast<std::size_t>(tile_.area()));
   }
   /// Writes the tile to its position in the view. Several threads may write different tiles.
   void writeTo(ViewPeaks& view, std::size_t tile) const {

@@ -166,22 +166,31 @@ Look lookAt(Job& job) {
   Progress progress("first look", job.verbosity);
   const auto next = [&] {
     requireNoStop(job);
+    const StageScope scope(&look.first.times, &StageSeconds::read, Processors::kThis);
     return source.read();  // the mapping reports damage
   };
   bool takes = samples.take(source.rig());  // the mapping reports rejected samples
   std::optional<Sample> sample;
   while ((takes || options.live.enabled) && (sample = next())) {
-    takes = samples.take(*sample);
-    if (const auto* packet = std::get_if<EventPacket>(&*sample)) statistics.addEvents(*packet);
-    held->hold(std::move(*sample));
+    {
+      const StageScope scope(&look.first.times, &StageSeconds::look, Processors::kThis);
+      takes = samples.take(*sample);
+      if (const auto* packet = std::get_if<EventPacket>(&*sample)) statistics.addEvents(*packet);
+      held->hold(std::move(*sample));
+    }
     progress.show(source.progress());
     if (job.on_progress) job.on_progress("first look", source.progress());
   }
   if (takes) held->end();
 
-  RecordingSurvey survey = samples.finish();
-  auto [mapper, choice, verdict] = chooseAndJudge(survey, options);
-  look.undistortion = std::move(survey.undistortion);
+  Chosen chosen;
+  {
+    const StageScope scope(&look.first.times, &StageSeconds::look);
+    RecordingSurvey survey = samples.finish();
+    chosen = chooseAndJudge(survey, options);
+    look.undistortion = std::move(survey.undistortion);
+  }
+  auto& [mapper, choice, verdict] = chosen;
   options.mapper = std::move(mapper);
   std::vector<std::string> doubts;
   if (options.automatic.any()) {

@@ -94,7 +94,7 @@ std::optional<KeyframeDepthMap> RecordingKeyframes::takeMade() {
 bool RecordingKeyframes::feedNext() {
   std::optional<Sample> sample;
   const bool is_read = attempt([&] {
-    const StageScope scope(&reading_, &StageSeconds::read, Processors::kThis);
+    const StageScope scope(&first_.times, &StageSeconds::read, Processors::kThis);
     sample = recording_.read();
   });
   if (!sample) {
@@ -222,8 +222,10 @@ void RecordingKeyframes::describe(RunReport& report) {
   if (stopped_) report.stopped_at = fraction();
   report.refinement = status.refinement;
   report.times = status.times;
-  report.times.real.read = reading_.real.read;
-  report.times.cpu.read = reading_.cpu.read;
+  for (auto StageSeconds::*stage : {&StageSeconds::read, &StageSeconds::look}) {
+    report.times.real.*stage = first_.times.real.*stage;
+    report.times.cpu.*stage = first_.times.cpu.*stage;
+  }
   report.pixels = depths_.pixels();
   report.quality = status.quality;
   if (status.events) {

@@ -27,6 +27,7 @@ struct FirstPass {
   std::vector<ChosenOption> chosen;  ///< The options that were automatic.
   RecordingStatistics statistics;    ///< Statistics of the events; the mapping adds the poses.
   QualityFacts quality;
+  StageTimes times;  ///< Of `read` and `look`.
 };
 
 /// The keyframes of a recording, one after the other: feeds the recording to a mapper sample by
@@ -81,7 +82,6 @@ class RecordingKeyframes {
   FirstPass first_;
   const Verbosity verbosity_;
   const Host host_;
-  StageTimes reading_;
   DepthStatistics depths_;
   std::optional<UserError> error_;
   bool stopped_ = false;

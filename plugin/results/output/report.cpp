@@ -62,27 +62,30 @@ Json asJson(const EventCounts& counts) {
 }
 
 Json asJson(const StageSeconds& seconds) {
-  return {
-      {"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.rays + seconds.sweep},
-      {"depth", seconds.depth}, {"motion", seconds.motion}, {"refine", seconds.refine},
-      {"map", seconds.map}};
+  return {{"total", seconds.total},   {"read", seconds.read},
+          {"look", seconds.look},     {"sweep", seconds.rays + seconds.sweep},
+          {"depth", seconds.depth},   {"motion", seconds.motion},
+          {"refine", seconds.refine}, {"map", seconds.map}};
 }
 
 /// Returns processor time: the fixed cost of a run, and costs that grow with events and keyframes.
 Json byGrowth(const StageSeconds& cpu) {
-  const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.rays +
-                          cpu.sweep + cpu.depth + cpu.motion + cpu.refine + cpu.map + cpu.images;
-  return {{"total", cpu.total},
-          {"once", {{"start", cpu.start}, {"tables", cpu.tables}, {"output", cpu.output}}},
-          {"events", {{"read", cpu.read}, {"filter", cpu.filter}}},
-          {"keyframes",
-           {{"sweep", cpu.rays + cpu.sweep},
-            {"depth", cpu.depth},
-            {"motion", cpu.motion},
-            {"refine", cpu.refine},
-            {"map", cpu.map},
-            {"images", cpu.images}}},
-          {"other", std::max(0.0, cpu.total - measured)}};
+  const double measured = cpu.start + cpu.look + cpu.tables + cpu.output + cpu.read + cpu.filter +
+                          cpu.rays + cpu.sweep + cpu.depth + cpu.motion + cpu.refine + cpu.map +
+                          cpu.images;
+  return {
+      {"total", cpu.total},
+      {"once",
+       {{"start", cpu.start}, {"look", cpu.look}, {"tables", cpu.tables}, {"output", cpu.output}}},
+      {"events", {{"read", cpu.read}, {"filter", cpu.filter}}},
+      {"keyframes",
+       {{"sweep", cpu.rays + cpu.sweep},
+        {"depth", cpu.depth},
+        {"motion", cpu.motion},
+        {"refine", cpu.refine},
+        {"map", cpu.map},
+        {"images", cpu.images}}},
+      {"other", std::max(0.0, cpu.total - measured)}};
 }
 
 Json asJson(const EventFusionOptions& options) {
@@ -230,6 +233,7 @@ std::string reportJson(const RunReport& report) {
   json["events"] = events;
   json["event_uses"] = counts.event_uses;
   json["votes"] = {{"cast", counts.votes.cast},
+                   {"interpolated", counts.votes.interpolated},
                    {"outside_view", counts.votes.outside_view},
                    {"behind_camera", counts.votes.behind_camera}};
   json["keyframes"] = counts.keyframes;

@@ -489,6 +489,68 @@ TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCoun
   }
 }
 
+/// Columns of the planes that were swept are those of a sweep of all planes, and interpolated
+/// between them; a sink and the cameras' own peaks get all planes.
+TEST_P(FastSweepOn, CoarseToFineDependsNeitherOnThreadsNorRequestsAndInterpolates) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
+  for (const FusionInputs inputs : {FusionInputs{2, 1, 4}, {3, 1, 2}}) {
+    SCOPED_TRACE(testing::Message() << inputs.cameras << " cameras");
+    test::RandomRays random(81);
+    test::SweepCase input = randomCase(random, {130, 70}, inverse(0.5, 5, 161), inputs, 2500);
+    input.column_window = 5;
+    const test::SweepOutput all = sweep(input, GetParam());
+    SpaceSweepOptions options;
+    options.fusion = input.fusion;
+    options.kernel = GetParam();
+    std::vector<SweepResult> results;
+    for (const bool with_all : {false, true}) {
+      for (const int threads : {1, 8}) {
+        options.threads = threads;
+        test::WholeDsi dsi(input.planes, input.view);
+        results.push_back(sweepSpace(
+            input.cameras, {input.view, input.planes}, options,
+            {with_all, with_all ? &dsi : nullptr, input.groups, input.column_window, 4}));
+        if (with_all) EXPECT_EQ(dsi.values, all.dsi);
+      }
+    }
+    const SweepResult& alone = results.front();
+    for (const SweepResult& result : results) {
+      EXPECT_TRUE(test::same(alone.fused.peaks.confidence, result.fused.peaks.confidence));
+      for (std::size_t c = 0; c < result.cameras.size(); ++c) {
+        EXPECT_TRUE(
+            test::same(result.cameras[c].peaks.confidence, all.result.cameras[c].peaks.confidence));
+      }
+      for (std::size_t c = 0; c < input.cameras.size(); ++c) {
+        EXPECT_EQ(result.votes[c].total(), all.result.votes[c].total());
+        EXPECT_EQ(result.votes[c].behind_camera, all.result.votes[c].behind_camera);
+        EXPECT_EQ(result.votes[c].interpolated > 0, result.cameras.empty());
+      }
+    }
+    const DsiColumns& columns = alone.fused.columns;
+    int coarse_only = 0;
+    for (int y = 0; y < input.view.height; ++y) {
+      for (int x = 0; x < input.view.width; ++x) {
+        if (!columns.has({x, y})) continue;
+        const double confidence = alone.fused.peaks.confidence(y, x);
+        const double step = confidence / 64;  // twice the step of a byte near the peak
+        const auto exact = [&](int plane) {
+          return double{all.dsi[static_cast<std::size_t>(
+              (plane * input.view.height + y) * input.view.width + x)]};
+        };
+        for (int plane = 0; plane + 4 < input.planes.size(); plane += 4) {
+          ASSERT_NEAR(columns.value({x, y}, plane), exact(plane), step);
+          const double middle = columns.value({x, y}, plane + 2);
+          const double line = (exact(plane) + exact(plane + 4)) / 2;
+          const bool is_exact = std::abs(middle - exact(plane + 2)) <= step;
+          ASSERT_TRUE(is_exact || std::abs(middle - line) <= step);
+          coarse_only += is_exact ? 0 : 1;
+        }
+      }
+    }
+    EXPECT_GT(coarse_only, 0);
+  }
+}
+
 // ---------------------------------------------------------------- tiles of the view
 
 TEST(ViewTiles, EveryPixelLiesInOneTileOfNearlyTheSameSize) {

@@ -53,7 +53,8 @@ TEST_F(MapCommand, CountsOfTheReportAddUp) {
     EXPECT_EQ(events["cameras"][c]["read"], sum(events["cameras"][c]));
   }
   const json& votes = report["votes"];
-  EXPECT_EQ(votes["cast"].get<std::uint64_t>() + votes["outside_view"].get<std::uint64_t>() +
+  EXPECT_EQ(votes["cast"].get<std::uint64_t>() + votes["interpolated"].get<std::uint64_t>() +
+                votes["outside_view"].get<std::uint64_t>() +
                 votes["behind_camera"].get<std::uint64_t>(),
             report["event_uses"].get<std::uint64_t>() * 30);
   EXPECT_GT(report["event_uses"], events["used"]) << "windows overlap";

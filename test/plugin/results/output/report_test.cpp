@@ -18,11 +18,11 @@ RunReport smallReport() {
   RunReport report;
   report.counts.cameras = {{10, 6, 1, 1, 1, 0, 0, 1}, {5, 5}};
   report.counts.event_uses = 20;
-  report.counts.votes = {1500, 400, 100};
+  report.counts.votes = {1500, 50, 400, 100};
   report.counts.keyframes = 2;
   report.points = 7;
-  report.times.real = {9, 1, 1.5, 2.5, 2, 0.5, 0, 1.5};
-  report.times.cpu = {100, 1, 0.5, 1.5, 3, 2, 4, 5, 6, 7, 8, 9, 10};
+  report.times.real = {9, 1, 0.25, 1.5, 2.5, 2, 0.5, 0, 1.5};
+  report.times.cpu = {100, 1, 11, 0.5, 1.5, 3, 2, 4, 5, 6, 7, 8, 9, 10};
   report.options.mapper.keyframe.sweep.threads = 3;
   return report;
 }
@@ -74,14 +74,14 @@ TEST(Report, EveryCountHasItsOwnKey) {
       "without_pose": 7, "outside_window": 8, "late": 12, "dropped": 9, "unselected": 15,
       "filtered": 10, "outside_lens": 6, "over_budget": 18})")}));
   expectKeys(written, R"({
-      "votes": {"cast": 1500, "outside_view": 400, "behind_camera": 100},
-      "seconds": {"total": 9, "read": 1, "sweep": 4, "depth": 2, "motion": 0.5, "refine": 0,
+      "votes": {"cast": 1500, "interpolated": 50, "outside_view": 400, "behind_camera": 100},
+      "seconds": {"total": 9, "read": 1, "look": 0.25, "sweep": 4, "depth": 2, "motion": 0.5, "refine": 0,
         "map": 1.5},
       "cpu_seconds": {"total": 100,
-        "once": {"start": 8, "tables": 9, "output": 10},
+        "once": {"start": 8, "look": 11, "tables": 9, "output": 10},
         "events": {"read": 1, "filter": 6},
         "keyframes": {"sweep": 2, "depth": 3, "motion": 2, "refine": 4, "map": 5, "images": 7},
-        "other": 43},
+        "other": 32},
       "schema": 1, "event_uses": 20, "keyframes": 2, "keyframes_without_pose": 12,
       "windows_without_events": 13, "silent": {"subintervals": 14, "keyframes": [0, 17]},
       "sorted_events": 15, "skipped_events": 3, "duplicate_poses": 16, "points": 7,
