@@ -285,13 +285,13 @@ std::string beginning(std::string_view bytes) {
 
 }  // namespace
 
-std::string encodePng(const cv::Mat& picture, PngPacking packing) {
+std::string encodePng(const cv::Mat& picture) {
   assert(picture.type() == CV_8UC1 || picture.type() == CV_8UC3);
   const PngCodec codec = pngCodec(SPNG_CTX_ENCODER);
   spng_ctx* const png = codec.get();
   const bool grey = picture.channels() == 1;
   spng_set_option(png, SPNG_ENCODE_TO_BUFFER, 1);
-  spng_set_option(png, SPNG_IMG_COMPRESSION_LEVEL, packing == PngPacking::kSmall ? 6 : 1);
+  spng_set_option(png, SPNG_IMG_COMPRESSION_LEVEL, 1);
   spng_set_option(png, SPNG_IMG_COMPRESSION_STRATEGY, Z_DEFAULT_STRATEGY);
   spng_set_option(png, SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_NONE);
   spng_ihdr header{};

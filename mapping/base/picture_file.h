@@ -8,16 +8,11 @@
 
 namespace efm {
 
-/// Compression of a PNG. Rows are stored as they are: PNG's filters take four times the time, and
-/// flat colours become no smaller by them.
-enum class PngPacking {
-  kQuick,  ///< zlib's level 1.
-  kSmall,  ///< zlib's level 6. Depth maps: three quarters of the size, three times the time.
-};
-
-/// Returns the bytes of a PNG file.
+/// Returns the bytes of a PNG file: rows as they are, packed by zlib's level 1. Figures with PNG's
+/// filters take four times the time and are not smaller; with level 6, a quarter smaller and three
+/// times the time.
 /// @param picture 8-bit, grey or BGR.
-std::string encodePng(const cv::Mat& picture, PngPacking packing);
+std::string encodePng(const cv::Mat& picture);
 
 /// Returns the bytes of a float32 TIFF file, without compression.
 std::string encodeTiff(const cv::Mat1f& image);

@@ -115,6 +115,7 @@ struct Sums {
   Information information = Information::Zero();
   Parameters gradient = Parameters::Zero();
   double xy = 0, xx = 0, yy = 0;
+  std::size_t inside = 0;  // pixels that lie in both maps
 
   void add(const MapPair& pair, std::size_t scale, const Parameters& now) {
     const cv::Mat1f& own = pair.own[scale];
@@ -131,6 +132,7 @@ struct Sums {
       const double weight = 1 / (1 + residual * residual);  // Cauchy
       information += weight * row.transpose() * row;
       gradient += weight * residual * row.transpose();
+      ++inside;
       xy += x * y;
       xx += x * x;
       yy += y * y;
@@ -357,17 +359,20 @@ class CameraFit {
   static double otherScale(const Pairs& all, const Fit& whole) {
     Parameters best = Parameters::Zero();
     double best_correlation = 0;
+    std::size_t pixels = 0;
+    for (const MapPair* pair : all) pixels += pair->pixels.size();
     for (const double factor : {1.0, 0.7, 0.5, 0.3, 0.1, 0.01, 1.4, 2.0, 3.0, 10.0, 100.0}) {
       const Parameters start = 100 * (factor - 1) * Parameters::Unit(kBaseline);
       Sums sums;
       for (const MapPair* pair : all) sums.add(*pair, 0, start);
-      if (sums.correlation() <= best_correlation) continue;
+      const bool is_seen = 2 * sums.inside >= pixels;  // otherwise the fit is one of chance
+      if (!is_seen || sums.correlation() <= best_correlation) continue;
       best_correlation = sums.correlation();
       best = start;
     }
     if (best.isZero()) return 1;
     const Fit scaled = fit(all, kClock, true, best, 0);
-    if (scaled.correlation <= whole.correlation) return 1;
+    if (scaled.correlation <= std::max(whole.correlation, kMinCorrelation)) return 1;
     return 1 + 0.01 * std::copysign(scaled.baseline_rms, best[kBaseline]);
   }
 

@@ -34,6 +34,7 @@ void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
 constexpr std::size_t kMaxWindows = 3;
 constexpr std::size_t kMinDepths = 50;
 constexpr std::int64_t kClockNs = 5'000'000;  // shift to either side: 10 ms between the two
+constexpr double kMinChange = 0.01;           // by the clock
 constexpr double kTravel = 0.05;
 constexpr Coarseness kSmallSweep{160, 20'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
 
@@ -92,24 +93,33 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
     const cv::Mat1f given = depthsWith(0, 1, &variance);
     const cv::Mat1f early = depthsWith(-kClockNs, 1, nullptr);
     const cv::Mat1f late = depthsWith(kClockNs, 1, nullptr);
-    const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
-    if (given.empty() || early.empty() || late.empty() || farther.empty()) continue;
+    if (given.empty() || early.empty() || late.empty()) continue;
     std::vector<double> clock, travel, sigma;  // of the pixels
     for (int y = 0; y < given.rows; ++y) {
       for (int x = 0; x < given.cols; ++x) {
         if (early(y, x) > 0 && late(y, x) > 0) clock.push_back(std::log(early(y, x) / late(y, x)));
         if (!(given(y, x) > 0)) continue;
         sigma.push_back(given(y, x) * std::sqrt(double{variance(y, x)}));
-        if (farther(y, x) > 0) travel.push_back(std::log(farther(y, x) / given(y, x)));
       }
     }
-    if (std::min({clock.size(), travel.size(), sigma.size()}) < kMinDepths) continue;
+    if (std::min(clock.size(), sigma.size()) < kMinDepths) continue;
     by_clock.push_back(std::abs(upperMedian(clock)));
-    by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
     sigmas.push_back(upperMedian(sigma));
+    if (by_clock.back() < kMinChange) continue;
+    const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
+    for (int y = 0; y < farther.rows; ++y) {
+      for (int x = 0; x < farther.cols; ++x) {
+        if (given(y, x) > 0 && farther(y, x) > 0) {
+          travel.push_back(std::log(farther(y, x) / given(y, x)));
+        }
+      }
+    }
+    if (travel.size() < kMinDepths) continue;
+    by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
   }
   if (sigmas.empty()) return std::nullopt;
-  return DepthSensitivity{upperMedian(by_clock), 0.01 * upperMedian(by_travel),
+  return DepthSensitivity{upperMedian(by_clock),
+                          by_travel.empty() ? 0 : 0.01 * upperMedian(by_travel),
                           upperMedian(sigmas)};
 }
 

@@ -30,7 +30,9 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
 /// median over some windows of the median over the pixels.
 struct DepthSensitivity {
   double per_10_ms = 0;           ///< Change by a clock that is wrong by 10 ms.
-  double per_percent_travel = 0;  ///< Change by positions that are scaled by 1 %.
+  /// Change by positions that are scaled by 1 %. It is measured where the clock changes the depths
+  /// by a percent or more; otherwise it is 0.
+  double per_percent_travel = 0;
   double sigma = 0;               ///< The standard deviation of the depths by their variance.
 };
 

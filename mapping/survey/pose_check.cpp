@@ -64,7 +64,7 @@ constexpr double kMaxTypicalWrong = 0.8;
 // Clearly right poses: some hypotheses are enough, and no mirror or far clock is tried.
 constexpr double kMaxTypicalClear = 0.75;
 constexpr double kMaxBestClear = 0.95;
-constexpr double kMaxBesideClear = 0.97;  // of the clocks kClockS beside
+constexpr double kMaxBesideClear = 0.99;  // of the clocks kClockS beside
 constexpr double kMinSeenS = 0.5;
 constexpr double kMinMargin = 1.02;     // of the best mistake over the next one
 constexpr double kEqual = 0.93;         // of the best gain, in each half of the data
@@ -107,7 +107,6 @@ class PoseCheck {
       : rig_(rig), options_(options), sharpness_(rig, options) {
     for (SamplePiece& piece : piecesOf(samples, options.trajectory)) {
       if (sharpness_.shiftIn(piece) < kMinShiftM) continue;
-      as_given_.push_back(std::max(sharpness_.of(piece, piece.trajectory), kBlurred));
       pieces_.push_back(std::move(piece));
     }
   }
@@ -218,10 +217,10 @@ class PoseCheck {
       if (known == shifted_.end()) {
         Trajectory moved(options_.trajectory);
         for (const StampedPose& pose : poses) moved.add({pose.t_ns - shift_ns, pose.T_world_rig});
-        const double sharpness = shift_ns == 0 ? as_given_[i] : sharpness_.of(piece, moved);
+        const double sharpness = shift_ns == 0 ? asGiven(i) : sharpness_.of(piece, moved);
         known = shifted_.emplace(std::pair(shift_ns, i), sharpness).first;
       }
-      gains.add(known->second, as_given_[i]);
+      gains.add(known->second, asGiven(i));
     }
     return gains;
   }
@@ -253,22 +252,25 @@ class PoseCheck {
   }
 
   void compareTimes() {
-    std::vector<double> shifts_s;
-    for (int part = 1; part <= 8; part *= 2) shifts_s.push_back(kTimeStepS / part);
+    std::vector<double> shifts_s = {kTimeStepS / 8, kTimeStepS / 4};
     const auto isWorse = [&](double s) {
       const Gains gains = gainsOfShift(s, half());
       return !gains.logs.empty() && gains.mean() < kMaxBesideClear;
     };
-    if (!(areClear() && isWorse(kClockS) && isWorse(-kClockS))) {
-      for (double s = 2 * kTimeStepS; s <= kMaxTimeShiftS; s += (s < 0.2 ? 1 : 2) * kTimeStepS) {
+    const bool is_clear = areClear() && isWorse(kClockS) && isWorse(-kClockS);
+    if (!is_clear) {
+      shifts_s.push_back(kTimeStepS / 2);
+      for (double s = kTimeStepS; s <= kMaxTimeShiftS; s += (s < 0.2 ? 1 : 2) * kTimeStepS) {
         shifts_s.push_back(s);
       }
     }
     const double best_s =
         bestShift(shifts_s, [&](double s, double least) { return gainsOfShift(s, half(), least); });
+    // The clock of clearly right poses needs no proof by the other half of the pieces.
+    const std::size_t count = is_clear && best_s == 0 ? half() : pieces_.size();
     const auto gainsOf = [&](double s) {
-      Gains gains = gainsOfShift(s, pieces_.size());
-      if (4 * gains.logs.size() < 3 * pieces_.size()) gains.logs.clear();
+      Gains gains = gainsOfShift(s, count);
+      if (4 * gains.logs.size() < 3 * count) gains.logs.clear();
       return gains;
     };
     Candidate candidate;
@@ -306,7 +308,7 @@ class PoseCheck {
         for (std::size_t k = 0; k < count && (k == 0 || gains.mean() >= least); ++k) {
           SamplePiece piece = pieces_[k];
           for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(shift_s);
-          gains.add(sharpness_.of(piece, piece.trajectory), as_given_[k]);
+          gains.add(sharpness_.of(piece, piece.trajectory), asGiven(k));
         }
         return gains;
       };
@@ -397,6 +399,14 @@ class PoseCheck {
     }
   }
 
+  /// Returns the sharpness of a piece with the poses as they are.
+  double asGiven(std::size_t piece) {
+    for (std::size_t i = as_given_.size(); i <= piece; ++i) {
+      as_given_.push_back(std::max(sharpness_.of(pieces_[i], pieces_[i].trajectory), kBlurred));
+    }
+    return as_given_[piece];
+  }
+
   /// Adds a candidate. @return its gains, of fewer pieces if the first ones are not `promising`.
   template <typename Measure>
   const Gains& compare(const PoseFinding& finding, Measure sharpness_of, double promising = 1) {
@@ -404,7 +414,7 @@ class PoseCheck {
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
       if (i >= half() && gains.mean() < promising) break;
       if (i > 0 && gains.mean() < kHopeless) break;
-      gains.add(sharpness_of(pieces_[i]), as_given_[i]);
+      gains.add(sharpness_of(pieces_[i]), asGiven(i));
     }
     return gains;
   }
@@ -525,7 +535,7 @@ class PoseCheck {
   const FusionMapperOptions& options_;
   EventSharpness sharpness_;
   std::vector<SamplePiece> pieces_;
-  std::vector<double> as_given_;  // of each piece
+  std::vector<double> as_given_;  // of the first pieces, those that were needed so far
   std::vector<Candidate> candidates_;
   std::map<std::pair<std::int64_t, std::size_t>, double> shifted_;  // by time shift and piece
   double typical_wrong_ = 0;  // the median gain of the hypotheses: at most one is right

@@ -13,8 +13,8 @@ namespace efm {
 /// Flags, one per plane.
 using PlaneSet = std::vector<bool>;
 
-/// Returns the distance of the planes that are swept first: 1 (all) to 3. They are at most a 180th
-/// of the view's width of parallax apart, which is about the width of a peak.
+/// Returns the distance of the planes that are swept first: 1 (all) to 3. They are at most about
+/// the width of a peak apart.
 /// @param range_px the parallax between the first and the last plane, pixels.
 int coarseStep(const DepthPlanes& planes, const ReferenceView& view, double range_px);
 

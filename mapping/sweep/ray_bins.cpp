@@ -185,10 +185,7 @@ RayBins::Axis RayBins::axisOf(Eigen::Index axis, int pixels, double principal,
   return {range, static_cast<float>(side)};
 }
 
-/// Visits the rays that cross the view: visit(ray, column, row, x, y). (column, row) is the bin,
-/// (x, y) the pixel at the other end of the planes.
-template <typename Visit>
-void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
+void RayBins::store(const RayBundle& bundle) {
   struct ToPlane {
     ToPlane(const RayPacket& packet, const ReferenceView& view, double inverse_depth) {
       const PlaneTransfer to = transferToPlane(packet, view, 1 / inverse_depth);
@@ -206,6 +203,17 @@ void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
     return (max >= -kRounding_px) & (min <= static_cast<float>(pixels - 1) + kRounding_px) &
            (max - min < kFinite);
   };
+  struct Crossing {  // a ray that crosses the view
+    kernels::BinnedRay ray;
+    std::uint32_t bin;
+  };
+  std::vector<Crossing> crossing;
+  std::size_t count = 0;
+  for (const RayPacket& packet : packets_) count += packet.end - packet.begin;
+  crossing.reserve(count);
+  const std::size_t columns = columns_.bins();
+  begin_.assign(rows_.bins() * columns + 1, 0);
+  float max_shift = 0;
   for (const RayPacket& packet : packets_) {
     const ToPlane anchor(packet, view_, anchor_);
     const ToPlane other(packet, view_, other_);
@@ -221,32 +229,22 @@ void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
       const float x_other = other.scale * x_inf + other.x;
       const float y_other = other.scale * y_inf + other.y;
       if (!(crosses(x, x_other, view_.width) & crosses(y, y_other, view_.height))) continue;
-      visit(kernels::BinnedRay{x, y, a - c * x_inf, b - c * y_inf}, columns_.binOf(x),
-            rows_.binOf(y), x_other, y_other);
+      const kernels::BinnedRay ray{x, y, a - c * x_inf, b - c * y_inf};
+      const std::size_t column = columns_.binOf(x);
+      const std::size_t row = rows_.binOf(y);
+      max_shift = std::max({max_shift, std::abs(ray.dx), std::abs(ray.dy)});
+      columns_.on_anchor[column].extend(x);
+      columns_.on_other[column].extend(x_other);
+      rows_.on_anchor[row].extend(y);
+      rows_.on_other[row].extend(y_other);
+      crossing.push_back({ray, static_cast<std::uint32_t>(row * columns + column)});
+      ++begin_[crossing.back().bin + 1];
     }
   }
-}
-
-void RayBins::store(const RayBundle& bundle) {
-  using kernels::BinnedRay;
-  const std::size_t columns = columns_.bins();
-  begin_.assign(rows_.bins() * columns + 1, 0);
-  float max_shift = 0;
-  forEachRay(bundle,
-             [&](const BinnedRay& ray, std::size_t column, std::size_t row, float x, float y) {
-               ++begin_[row * columns + column + 1];
-               max_shift = std::max({max_shift, std::abs(ray.dx), std::abs(ray.dy)});
-               columns_.on_anchor[column].extend(ray.x);
-               columns_.on_other[column].extend(x);
-               rows_.on_anchor[row].extend(ray.y);
-               rows_.on_other[row].extend(y);
-             });
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
   rays_.resize(begin_.back() + kernels::kRayPadding);
-  forEachRay(bundle, [&](const BinnedRay& ray, std::size_t column, std::size_t row, float, float) {
-    rays_[next[row * columns + column]++] = ray;
-  });
+  for (const Crossing& of : crossing) rays_[next[of.bin]++] = of.ray;
   packets_ = {};
   constexpr double kMaxDistance_px = 8192;  // floats have a resolution of 1/2048 px there
   moving_ = double{max_shift} * std::abs(to_pixels_) <= kMaxDistance_px;

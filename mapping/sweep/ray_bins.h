@@ -127,8 +127,6 @@ class RayBins {
   Axis axisOf(Eigen::Index axis, int pixels, double principal, const Range& at_infinity,
               std::size_t rays) const;
   Footprint::Side sideOf(const Axis& axis, const PlaneRange& planes) const;
-  template <typename Visit>
-  void forEachRay(const RayBundle& bundle, const Visit& visit) const;
   void store(const RayBundle& bundle);
 
   PlaneRange planes_;  // in front of the cameras

@@ -238,13 +238,14 @@ class TiledSweep {
 
  private:
   Scratch newScratch() const {
-    const TilePeaks peaks(grid_.planes.size(), request_.column_window,
-                          TileCells::kMaxPixels * TileCells::kMaxPixels);
+    TilePeaks peaks(grid_.planes.size(), request_.column_window,
+                    TileCells::kMaxPixels * TileCells::kMaxPixels);
     const auto keep =
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
+    std::vector<TilePeaks> cameras(cameras_.size(), peaks);
     return {std::vector<TileRays>(rays_.inputs()),
-            TileFusion(options_.fusion, inputs_, keep, kernel_), peaks,
-            std::vector<TilePeaks>(cameras_.size(), peaks),
+            TileFusion(options_.fusion, inputs_, keep, kernel_), std::move(peaks),
+            std::move(cameras),
             std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 

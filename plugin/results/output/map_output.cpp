@@ -51,7 +51,7 @@ std::filesystem::path cameraFolder(const std::filesystem::path& folder, int came
 void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
   const bool png = path.extension() == ".png";
   write(path, byStream([&](std::ostream& file) {
-          file << (png ? encodePng(image, PngPacking::kQuick) : encodeTiff(image));
+          file << (png ? encodePng(image) : encodeTiff(image));
         }));
 }
 

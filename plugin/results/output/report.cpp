@@ -257,8 +257,8 @@ std::string reportJson(const RunReport& report) {
   json["seconds"] = asJson(report.times.real);
   json["cpu_seconds"] = byGrowth(report.times.cpu);
   const double sweep_s = report.times.real.rays + report.times.real.sweep;
-  json["votes_per_second"] =
-      sweep_s > 0 ? static_cast<double>(counts.votes.total()) / sweep_s : 0.0;
+  const std::uint64_t swept = counts.votes.total() - counts.votes.interpolated;
+  json["votes_per_second"] = sweep_s > 0 ? static_cast<double>(swept) / sweep_s : 0.0;
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
   json["threads"] = sweep.threadsOrCores();
   json["peak_memory_bytes"] = report.peak_memory_bytes;

@@ -65,15 +65,17 @@ class ShownPositions {
                    [&](const Eigen::Vector3d& p) { return p.dot(axis); });
     Extent extent;
     if (values.empty()) return extent;
-    std::sort(values.begin(), values.end());
     const double last = static_cast<double>(values.size() - 1);
     for (const double fraction : {0.01, 0.99}) {
-      extent.add(values[static_cast<std::size_t>(std::lround(fraction * last))]);
+      const auto nth = values.begin() + std::lround(fraction * last);
+      std::nth_element(values.begin(), nth, values.end());
+      extent.add(*nth);
     }
     const double margin = beyond * extent.length();
     const Extent wide = {extent.low - margin, extent.high + margin};
-    extent.low = *std::lower_bound(values.begin(), values.end(), wide.low);
-    extent.high = *std::prev(std::upper_bound(values.begin(), values.end(), wide.high));
+    for (const double value : values) {
+      if (value >= wide.low && value <= wide.high) extent.add(value);
+    }
     return extent;
   }
 

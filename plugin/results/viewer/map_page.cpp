@@ -207,9 +207,8 @@ void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& 
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
   KeyframePicture added;
   const cv::Mat1f reduced_m = reducedDepth(depth_m, kMaxWidth);
-  constexpr PngPacking kPacking = PngPacking::kSmall;
-  added.depth = encodePng(depthPicture(reduced_m, limits_, Palette::kBrightToDark), kPacking);
-  if (!events.empty()) added.events = encodePng(eventPicture(reduced(events, factor)), kPacking);
+  added.depth = encodePng(depthPicture(reduced_m, limits_, Palette::kBrightToDark));
+  if (!events.empty()) added.events = encodePng(eventPicture(reduced(events, factor)));
   bytes_ += added.bytes();
   pictures_.emplace(keyframe, std::move(added));
   while (bytes_ > max_bytes_ && pictures_.size() > 1) {

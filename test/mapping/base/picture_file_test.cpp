@@ -114,11 +114,9 @@ TEST(PictureFile, OpenCvReadsThePixelsThatWereWritten) {
     for (const int type : {CV_8UC1, CV_8UC3}) {
       const cv::Mat whole = randomPixels(size + cv::Size(4, 4), type);
       const cv::Mat image = whole(cv::Rect({2, 2}, size));
-      for (const auto packing : {PngPacking::kQuick, PngPacking::kSmall}) {
-        const std::string bytes = encodePng(image, packing);
-        expectSame(byOpenCv(bytes), image);
-        expectSame(decodePicture(bytes), image);
-      }
+      const std::string bytes = encodePng(image);
+      expectSame(byOpenCv(bytes), image);
+      expectSame(decodePicture(bytes), image);
     }
     const cv::Mat1f depth = randomPixels(size, CV_32F);
     expectSame(byOpenCv(encodeTiff(depth)), depth);
@@ -172,8 +170,8 @@ TEST_F(TiffFiles, OfEachKindAreReadAsTheyWereWritten) {
 TEST_F(TiffFiles, AndPngsThatAreCutOrDamagedAreErrorsWithoutAWordOnTheTerminal) {
   testing::internal::CaptureStderr();
   for (const std::string& whole :
-       {encodePng(randomPixels({37, 21}, CV_8UC3), PngPacking::kQuick), tiff({}),
-        tiff({CV_16UC1, COMPRESSION_LZW}), tiff({CV_8UC3, COMPRESSION_ADOBE_DEFLATE, true})}) {
+       {encodePng(randomPixels({37, 21}, CV_8UC3)), tiff({}), tiff({CV_16UC1, COMPRESSION_LZW}),
+        tiff({CV_8UC3, COMPRESSION_ADOBE_DEFLATE, true})}) {
     for (std::size_t size = 0; size < whole.size(); size += 7) {
       EXPECT_THROW(decodePicture(whole.substr(0, size)), std::runtime_error) << size;
     }
@@ -207,7 +205,7 @@ TEST(PictureFile, ImagesThatTheirFileCannotHoldAreRejected) {
 
 TEST(PictureSize, IsThatOfTheHeader) {
   const cv::Mat image = randomPixels({346, 260}, CV_8UC3);
-  EXPECT_EQ(pictureSize(encodePng(image, PngPacking::kQuick)), image.size());
+  EXPECT_EQ(pictureSize(encodePng(image)), image.size());
   for (const int progressive : {0, 1}) {
     std::vector<uchar> jpeg;
     cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});

@@ -362,9 +362,10 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
   const auto& fates = counts.cameras.at(0).fates.counts;
   const auto& dropped = counts.dropped_windows.counts;
   numbers.insert(numbers.end(), fates.begin(), fates.end());
-  numbers.insert(numbers.end(), {counts.event_uses, counts.votes.cast, counts.votes.outside_view,
-                                 counts.votes.behind_camera, counts.keyframes,
-                                 counts.keyframes_without_pose, counts.windows_without_events});
+  numbers.insert(numbers.end(),
+                 {counts.event_uses, counts.votes.cast, counts.votes.interpolated,
+                  counts.votes.outside_view, counts.votes.behind_camera, counts.keyframes,
+                  counts.keyframes_without_pose, counts.windows_without_events});
   numbers.insert(numbers.end(), dropped.begin(), dropped.end());
   numbers.insert(numbers.end(),
                  {counts.silent_subintervals, counts.sorted_events, counts.duplicate_poses});
@@ -374,21 +375,21 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
 TEST(MapperCounts, AddUpNumberByNumber) {
   const MapperCounts counts{{{1, {2, 3, 4, 5, 6, 7, 8, 9, 10}}},
                             11,
-                            {12, 13, 14},
-                            15,
+                            {12, 13, 14, 15},
                             16,
                             17,
-                            {18, 19, 20, 21, 22, 23, 24, 25},
-                            26,
+                            18,
+                            {19, 20, 21, 22, 23, 24, 25, 26},
                             27,
                             28,
+                            29,
                             {33, 34, 0.5, std::log(2)}};
   MapperCounts sum = counts;
   sum += counts;
   const std::vector<std::uint64_t> numbers = numbersOf(sum);
-  ASSERT_EQ(numbers.size(), 28U);
+  ASSERT_EQ(numbers.size(), 29U);
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], 2 * (i + 1));
-  EXPECT_EQ(counts.dropped_windows.total(), 18U + 19 + 20 + 21 + 22 + 23 + 24 + 25);
+  EXPECT_EQ(counts.dropped_windows.total(), 19U + 20 + 21 + 22 + 23 + 24 + 25 + 26);
   sum.cameras.resize(2);
   EXPECT_EQ(sum.motion.known, 66U);
   EXPECT_EQ(sum.motion.corrected, 68U);

@@ -496,7 +496,7 @@ TEST_P(FastSweepOn, CoarseToFineDependsNeitherOnThreadsNorRequestsAndInterpolate
   for (const FusionInputs inputs : {FusionInputs{2, 1, 4}, {3, 1, 2}}) {
     SCOPED_TRACE(testing::Message() << inputs.cameras << " cameras");
     test::RandomRays random(81);
-    test::SweepCase input = randomCase(random, {130, 70}, inverse(0.5, 5, 161), inputs, 2500);
+    test::SweepCase input = randomCase(random, {130, 70}, inverse(0.5, 5, 501), inputs, 2500);
     input.column_window = 5;
     const test::SweepOutput all = sweep(input, GetParam());
     SpaceSweepOptions options;

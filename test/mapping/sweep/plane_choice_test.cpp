@@ -25,11 +25,11 @@ TEST(CoarseStep, IsAPeakWideAndAtMostThreePlanes) {
     double range_px;
     int step;
   };
-  for (const Row& row : {Row{360, 101, 50, 3},  // 0.5 px between planes, peaks of 2 px
-                         {360, 101, 100, 2},    // 1 px
-                         {360, 101, 210, 1},    // 2.1 px
-                         {1280, 101, 210, 3},   // larger views have wider peaks
-                         {160, 101, 100, 1},
+  for (const Row& row : {Row{360, 101, 60, 3},  // 0.6 px between planes, peaks of 1.9 px
+                         {360, 101, 90, 2},
+                         {360, 101, 100, 1},
+                         {1280, 101, 100, 3},  // larger views have wider peaks
+                         {160, 101, 70, 1},
                          {360, 25, 0, 3},  // no parallax
                          {360, 1, 0, 3}}) {
     const ReferenceView view{row.width, 100, 1, 1, 0, 0};
@@ -74,12 +74,12 @@ class PlanesAtEdges : public ::testing::Test {
   }
 };
 
-TEST_F(PlanesAtEdges, LieOnBothSidesOfAnEdgeThatIsMoreThanAFewPerCentOfAll) {
+TEST_F(PlanesAtEdges, LieOnBothSidesOfAnEdgeThatIsMoreThanAHundredthOfAll) {
   EXPECT_THAT(of({{6, 5, 10}}, 1), ElementsAre(4, 5, 7, 8));
   EXPECT_THAT(of({{0, 5, 10}}, 0), ElementsAre(1, 2));
   EXPECT_THAT(of({{13, 5, 10}}, 0), IsEmpty());  // no plane lies between 12 and 13
   EXPECT_THAT(of({{6, 5, 10}, {12, 15, 1}}, 1), ElementsAre(4, 5, 7, 8, 10, 11));
-  EXPECT_THAT(of({{6, 5, 10}, {12, 15, 0.2F}}, 1), ElementsAre(4, 5, 7, 8));
+  EXPECT_THAT(of({{6, 5, 10}, {12, 15, 0.05F}}, 1), ElementsAre(4, 5, 7, 8));
 }
 
 TEST_F(PlanesAtEdges, AreNoneWithoutAnEdge) {

@@ -141,7 +141,7 @@ TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
 TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
   const cv::Mat1f depth(260, 720, 2.0F);
   const cv::Mat_<cv::Vec2i> events(260, 720, cv::Vec2i(0, 1));
-  KeyframePictures pictures({}, 3000);
+  KeyframePictures pictures({}, 9000);
   for (int i = 0; i < 100; ++i) pictures.add(depth, events);
   std::size_t bytes = 0;
   std::set<std::size_t> numbers;
@@ -149,7 +149,7 @@ TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
     bytes += picture.depth.size() + picture.events.size();
     numbers.insert(number);
   }
-  EXPECT_LE(bytes, 3000U);
+  EXPECT_LE(bytes, 9000U);
   ASSERT_GE(numbers.size(), 2U);
   const std::size_t stride = *std::next(numbers.begin());
   EXPECT_GT(stride, 1U);
