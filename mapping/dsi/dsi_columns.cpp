@@ -63,10 +63,7 @@ RootTable makeRootTable() {
 
 /// Returns the pixels of a tile whose confidence is above that of their surroundings.
 std::vector<cv::Point> standingOut(const cv::Mat1f& confidence, int window) {
-  // Isolated, because other threads may be writing the pixels around the tile.
-  cv::Mat1f surroundings;
-  cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0,
-                   cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  const cv::Mat1f surroundings = surroundingsOf(confidence, window);
   const int radius = window / 2;
   const cv::Rect inner(radius, radius, confidence.cols - 2 * radius, confidence.rows - 2 * radius);
   std::vector<cv::Point> pixels;
@@ -82,6 +79,14 @@ std::vector<cv::Point> standingOut(const cv::Mat1f& confidence, int window) {
 }
 
 }  // namespace
+
+cv::Mat1f surroundingsOf(const cv::Mat1f& confidence, int window) {
+  // Isolated, because other threads may be writing the pixels around the tile.
+  cv::Mat1f surroundings;
+  cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0,
+                   cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  return surroundings;
+}
 
 void TileVolume::setPlane(int plane, const PlaneValues& values) {
   assert(values.size() <= pixels_);

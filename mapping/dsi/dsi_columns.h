@@ -20,7 +20,7 @@ struct PeakFunctions;
 /// The peak of the DSI in the column of every pixel: images of the view's size. If whole columns
 /// are stored (`DsiColumns`), only the confidence is filled: columns have the other values.
 struct DsiPeaks {
-  cv::Mat1f confidence;  ///< The largest fused value; 0 if the pixel has no votes.
+  cv::Mat1f confidence;  ///< The largest fused value of the swept planes; 0 without votes.
   cv::Mat1i plane;       ///< The plane of `confidence`; the nearest if several are equal.
   cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
   cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
@@ -75,6 +75,10 @@ class TileVolume {
   std::size_t pixels_;
   PlaneValues values_;
 };
+
+/// Returns the Gaussian mean around each pixel of a tile. Pixels outside the tile do not count.
+/// @param window side of the Gaussian window, pixels, odd.
+cv::Mat1f surroundingsOf(const cv::Mat1f& confidence, int window);
 
 /// Columns of the fused DSI. A column has the values of one pixel on all planes. Only pixels that
 /// may become points have a column: their confidence is above that of their surroundings. In

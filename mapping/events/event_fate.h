@@ -96,7 +96,8 @@ struct EventCounts {
 /// cast + interpolated + outside_view + behind_camera = events x planes.
 struct VoteCounts {
   std::uint64_t cast = 0;
-  /// Votes on planes that tiles interpolate (`coarseStep`), as many as on the tiles' coarse planes.
+  /// Votes that tiles did not cast, because they interpolate the plane (`coarseStep`). An estimate:
+  /// a plane has as many as a coarse plane of its tile. `outside_view` is then the rest.
   std::uint64_t interpolated = 0;
   std::uint64_t outside_view = 0;   ///< Votes that have a neighbouring pixel outside the view.
   std::uint64_t behind_camera = 0;  ///< Votes whose point is behind the camera that saw the event.

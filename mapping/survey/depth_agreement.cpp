@@ -34,7 +34,6 @@ void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
 constexpr std::size_t kMaxWindows = 3;
 constexpr std::size_t kMinDepths = 50;
 constexpr std::int64_t kClockNs = 5'000'000;  // shift to either side: 10 ms between the two
-constexpr double kMinChange = 0.01;           // by the clock
 constexpr double kTravel = 0.05;
 constexpr Coarseness kSmallSweep{160, 20'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
 
@@ -105,7 +104,7 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
     if (std::min(clock.size(), sigma.size()) < kMinDepths) continue;
     by_clock.push_back(std::abs(upperMedian(clock)));
     sigmas.push_back(upperMedian(sigma));
-    if (by_clock.back() < kMinChange) continue;
+    if (by_clock.back() < kMinDepthChange) continue;
     const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
     for (int y = 0; y < farther.rows; ++y) {
       for (int x = 0; x < farther.cols; ++x) {
@@ -118,9 +117,11 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
     by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
   }
   if (sigmas.empty()) return std::nullopt;
-  return DepthSensitivity{upperMedian(by_clock),
-                          by_travel.empty() ? 0 : 0.01 * upperMedian(by_travel),
-                          upperMedian(sigmas)};
+  DepthSensitivity sensitivity;
+  sensitivity.per_10_ms = upperMedian(by_clock);
+  if (!by_travel.empty()) sensitivity.per_percent_travel = 0.01 * upperMedian(by_travel);
+  sensitivity.sigma = upperMedian(sigmas);
+  return sensitivity;
 }
 
 namespace {

@@ -26,14 +26,17 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
 
+/// A smaller change of the depths is no finding.
+inline constexpr double kMinDepthChange = 0.01;
+
 /// The changes of the depths with small errors of the poses, as fractions of the depth. Each is the
 /// median over some windows of the median over the pixels.
 struct DepthSensitivity {
-  double per_10_ms = 0;           ///< Change by a clock that is wrong by 10 ms.
-  /// Change by positions that are scaled by 1 %. It is measured where the clock changes the depths
-  /// by a percent or more; otherwise it is 0.
-  double per_percent_travel = 0;
-  double sigma = 0;               ///< The standard deviation of the depths by their variance.
+  double per_10_ms = 0;  ///< Change by a clock that is wrong by 10 ms.
+  /// Change by positions that are scaled by 1 %; std::nullopt if it was not measured: where the
+  /// clock changes the depths by less than `kMinDepthChange`, or few depths are left.
+  std::optional<double> per_percent_travel;
+  double sigma = 0;  ///< The standard deviation of the depths by their variance.
 };
 
 /// Maps windows of up to three samples coarsely: as they are, with other clocks, with more travel.

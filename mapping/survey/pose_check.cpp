@@ -52,7 +52,7 @@ constexpr double kMinShortShiftGain = 1.05;  // in less time than that, or witho
 constexpr double kMinPixelGain = 1.03;
 constexpr double kMinPixelGainOfOne = 1.1;
 constexpr double kHopeless = 0.7;        // gain of a piece: other pieces are not tried
-constexpr double kHopelessShift = 0.92;  // the same of a clock, of the best clock's gain
+constexpr double kHopelessShift = 0.92;  // the same of a clock, relative to the best clock so far
 constexpr double kMaxOtherPixels = 0.9;  // the pixels are right
 constexpr double kMinShiftS = 0.005;     // smallest shift that is reported
 // Gain of the best poses over typical wrong poses; less for clocks, which change little.
@@ -147,8 +147,8 @@ class PoseCheck {
   };
 
   void comparePoses() {
-    // Poses that are much sharper than with a third of the axes are right: the others are not
-    // tried.
+    // If the poses are much sharper than with the inverse, the other order of the quaternion and a
+    // third of the axes, they are right: the other axes are not tried.
     const auto isFirst = [](std::size_t i) { return i < 2 || i % 3 == 2; };
     const std::vector<PoseHypothesis> hypotheses = poseHypotheses();
     std::vector<double> wrong;
@@ -202,7 +202,7 @@ class PoseCheck {
   }
 
   /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
-  /// @param least the rest is left out if the first ones have less.
+  /// @param least stops where the mean gain of the pieces so far is lower.
   Gains gainsOfShift(double shift_s, std::size_t count, double least = 0) {
     Gains gains;
     const std::int64_t shift_ns = durationFromSeconds(shift_s);
@@ -226,7 +226,8 @@ class PoseCheck {
   }
 
   /// Searches the best time shift on the first half of the pieces, from coarse to fine.
-  /// @param gainsOf (shift, least gain) returns the gains of a shift, fewer if they are less.
+  /// @param gainsOf returns the gains of a shift, its first argument. It stops where their mean is
+  /// below its second argument.
   template <typename GainsOf>
   double bestShift(const std::vector<double>& shifts_s, GainsOf gainsOf) const {
     double best_s = 0;
@@ -535,7 +536,7 @@ class PoseCheck {
   const FusionMapperOptions& options_;
   EventSharpness sharpness_;
   std::vector<SamplePiece> pieces_;
-  std::vector<double> as_given_;  // of the first pieces, those that were needed so far
+  std::vector<double> as_given_;  // of the first pieces; `asGiven` adds others
   std::vector<Candidate> candidates_;
   std::map<std::pair<std::int64_t, std::size_t>, double> shifted_;  // by time shift and piece
   double typical_wrong_ = 0;  // the median gain of the hypotheses: at most one is right

@@ -73,8 +73,9 @@ struct PoseJudgement {
   std::optional<PoseFinding> finding;
   /// Without a finding: what could not be checked, and why; empty if the poses are right.
   std::string unchecked{};
-  /// Sharpness of the events with the poses as they are, relative to the sharpest alternative:
-  /// other axes, an inverse, or clocks at least 5 ms apart. std::nullopt if none was compared.
+  /// Sharpness of the events with the poses as they are, relative to the sharpest alternative that
+  /// was tried: other axes, an inverse, or clocks at least 5 ms apart. std::nullopt if none was
+  /// compared.
   std::optional<double> sharpness{};
 };
 
@@ -82,6 +83,7 @@ struct PoseJudgement {
 /// undone. Events are sharp if many rays meet in few points; see `EventSharpness`. A mistake is
 /// chosen on one half of the data and verified on the other half, and no other mistake may explain
 /// the events as well. A single camera needs more time: depths hide mistakes about its motion.
+/// Where the poses are clearly right, most axes, far clocks and mirrored pictures are not tried.
 PoseJudgement checkPoses(const Rig& rig, const std::vector<WindowSample>& samples,
                          const FusionMapperOptions& options);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/sweep/plane_choice.h"
 
-#include <opencv2/imgproc.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -30,11 +28,10 @@ PlaneSet coarsePlanes(int planes, int step) {
 
 PlaneSet planesAtEdges(const PlaneSet& coarse, const RunningPeaks& peaks, cv::Size tile,
                        int window) {
-  constexpr double kMinShare = 0.01;  // of the contrast of all edges in the tile
+  constexpr double kMinShare = 0.01;  // of the contrast in the tile
   const cv::Mat1f confidence(tile.height, tile.width,
                              const_cast<float*>(peaks.confidence().data()));
-  cv::Mat1f surroundings;
-  cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
+  const cv::Mat1f surroundings = surroundingsOf(confidence, window);
   std::vector<double> contrast(coarse.size());  // by plane
   auto plane = peaks.planes().begin();
   for (int y = 0; y < tile.height; ++y) {

@@ -18,13 +18,13 @@ using PlaneSet = std::vector<bool>;
 /// @param range_px the parallax between the first and the last plane, pixels.
 int coarseStep(const DepthPlanes& planes, const ReferenceView& view, double range_px);
 
-/// Returns every `step`-th plane, and the last one.
+/// Returns every `step`-th plane, and the last one. Both numbers are at least 1.
 PlaneSet coarsePlanes(int planes, int step);
 
-/// Returns the planes that are not coarse and next to a coarse plane on which a part of a tile's
-/// edges lies: pixels that stand out from their surroundings in confidence. Elsewhere, the DSI has
-/// noise, for whose depth the coarse planes are fine enough.
-/// @param peaks of the coarse planes. @param window as for `DsiColumns::select`.
+/// Returns the planes between two coarse planes of which one has more than a hundredth of a tile's
+/// contrast. Contrast is the confidence of a pixel above that of its surroundings, on the plane of
+/// its peak. On the other planes are noise and a few edges: coarse planes are fine enough.
+/// @param peaks of the coarse planes. @param window see `surroundingsOf`.
 PlaneSet planesAtEdges(const PlaneSet& coarse, const RunningPeaks& peaks, cv::Size tile,
                        int window);
 

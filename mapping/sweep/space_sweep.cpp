@@ -177,8 +177,9 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
-  std::vector<TilePeaks> cameras;           // empty if not requested
-  std::vector<std::uint64_t> interpolated;  // per camera: see VoteCounts; in units
+  std::vector<TilePeaks> cameras;  // empty if not requested
+  std::vector<std::uint64_t>
+      interpolated;  // by camera: VoteCounts::interpolated, in units of weight
 };
 
 /// The whole DSI for a sink.
@@ -249,43 +250,44 @@ class TiledSweep {
             std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 
-  /// Sweeps all planes on one tile.
+  /// Sweeps one tile: all planes, or the coarse planes and those between them at edges.
   void sweepTile(std::size_t t, Scratch& scratch) {
     const TileCells tile(tiles_[t], grid_.view);
     scratch.fusion.moveTo(tile);
     scratch.fused.moveTo(tile.tile, kernel_);
     for (TilePeaks& camera : scratch.cameras) camera.moveTo(tile.tile, kernel_);
-    const bool all = request_.column_window == 0 || request_.coarse_step == 1;
-    const PlaneSet coarse = coarsePlanes(grid_.planes.size(), all ? 1 : request_.coarse_step);
-    const std::vector<std::uint64_t> before = scratch.fusion.units();
-    sweepPlanes(coarse, true, tile, scratch);
-    if (!all) {
-      const std::vector<std::uint64_t> after = scratch.fusion.units();
-      const PlaneSet fine =
-          planesAtEdges(coarse, scratch.fused.peaks(), tile.tile.size(), request_.column_window);
-      sweepPlanes(fine, true, tile, scratch);
-      PlaneSet added(coarse.size());
-      for (std::size_t i = 0; i < added.size(); ++i) added[i] = coarse[i] || fine[i];
-      scratch.fused.interpolate(added);
-      if (request_.sink != nullptr || !cameras_.empty()) {
-        added.flip();
-        sweepPlanes(added, false, tile, scratch);
-      } else {
-        const auto others =
-            static_cast<std::uint64_t>(std::count(added.begin(), added.end(), false));
-        const auto swept =
-            static_cast<std::uint64_t>(std::count(coarse.begin(), coarse.end(), true));
-        for (std::size_t c = 0; c < after.size(); ++c) {
-          scratch.interpolated[c] += others * (after[c] - before[c]) / swept;
-        }
-      }
+    if (request_.column_window == 0 || request_.coarse_step == 1) {
+      sweepOnTile(coarsePlanes(grid_.planes.size(), 1), true, tile, scratch);
+    } else {
+      sweepCoarseToFine(tile, scratch);
     }
     scratch.fused.writeTo(fused_, t);
     for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
   }
 
+  void sweepCoarseToFine(const TileCells& tile, Scratch& scratch) {
+    const PlaneSet coarse = coarsePlanes(grid_.planes.size(), request_.coarse_step);
+    const std::vector<std::uint64_t> before = scratch.fusion.units();
+    sweepOnTile(coarse, true, tile, scratch);
+    const std::vector<std::uint64_t> after = scratch.fusion.units();
+    PlaneSet added =
+        planesAtEdges(coarse, scratch.fused.peaks(), tile.tile.size(), request_.column_window);
+    sweepOnTile(added, true, tile, scratch);
+    for (std::size_t plane = 0; plane < added.size(); ++plane) {
+      if (coarse[plane]) added[plane] = true;
+    }
+    scratch.fused.interpolate(added);
+    added.flip();
+    if (!cameras_.empty()) return sweepOnTile(added, false, tile, scratch);
+    const auto left_out = static_cast<std::uint64_t>(std::count(added.begin(), added.end(), true));
+    const auto swept = static_cast<std::uint64_t>(std::count(coarse.begin(), coarse.end(), true));
+    for (std::size_t c = 0; c < after.size(); ++c) {
+      scratch.interpolated[c] += left_out * (after[c] - before[c]) / swept;
+    }
+  }
+
   /// Sweeps some planes on a tile. @param adds true: also to the peaks of the fused DSI.
-  void sweepPlanes(const PlaneSet& set, bool adds, const TileCells& tile, Scratch& scratch) {
+  void sweepOnTile(const PlaneSet& set, bool adds, const TileCells& tile, Scratch& scratch) {
     for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
       const PlaneRange& planes = rays_.groups()[group];
       if (std::find(set.begin() + planes.begin, set.begin() + planes.end, true) ==
@@ -362,6 +364,7 @@ std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels) {
 
 SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options, const SweepRequest& request) {
+  assert(request.coarse_step >= 1 && (request.coarse_step == 1 || request.sink == nullptr));
   ThreadArena arena(options.threadsOrCores());
   return arena.execute(
       [&] { return TiledSweep(std::move(cameras), grid, options, request).run(); });

@@ -17,7 +17,8 @@ namespace efm {
 struct SpaceSweepOptions {
   FusionOptions fusion;
 
-  // For speed only. The number of threads never changes the result; kernels agree up to rounding.
+  // For speed. The number of threads never changes the result. Kernels agree up to rounding where
+  // all planes are swept.
   std::optional<int> threads;          ///< 1 to 1024; default: the number of cores.
   std::optional<VotingKernel> kernel;  ///< One of `availableKernels`; default: the fastest.
   /// True: with columns, tiles do not sweep the planes between coarse planes where no edge lies.
@@ -52,9 +53,10 @@ struct SweepRequest {
   /// Side of a Gaussian window in pixels: odd, at least 3; or 0 for no columns. Pixels get a column
   /// if their confidence is above its mean in the window. Peaks then have only the confidence.
   int column_window = 0;
-  /// With columns: see `coarseStep`. Each tile sweeps these planes first, then the planes between
-  /// them where its edges lie (`planesAtEdges`). The columns of the other planes are interpolated;
-  /// a sink and each camera's own peaks get all planes. The plain kernel sweeps all planes.
+  /// At least 1; see `coarseStep`. Above 1, with columns and without a sink: each tile sweeps these
+  /// planes first, then the planes between them where its edges lie (`planesAtEdges`). The columns
+  /// of the other planes are interpolated; each camera's own peaks get all planes. The plain kernel
+  /// sweeps all planes.
   int coarse_step = 1;
 };
 
@@ -88,8 +90,8 @@ std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels);
 
 /// Sweeps with the fast kernels, tile by tile. A tile is a small rectangle of the view. Its votes
 /// on one plane, their fusion and the running peaks stay in the first two levels of cache, and no
-/// whole plane is stored. Planes are in groups; a tile gathers its rays once per group. Memory
-/// besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
+/// whole plane is stored. Planes are in groups; a tile gathers its rays once per group and pass.
+/// Memory besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
 /// threads.
 ///
 /// Tiles share no data, and a tile's votes have a fixed order: the result has the same bits for any

@@ -204,15 +204,16 @@ std::optional<Warning> agreementWarning(const DepthAgreement& agreement) {
 }
 
 std::optional<Warning> sensitivityWarning(const DepthSensitivity& sensitivity) {
-  constexpr double kMinChange = 0.01;
-  if (sensitivity.per_10_ms < std::max(kMinChange, sensitivity.sigma)) return std::nullopt;
+  if (sensitivity.per_10_ms < std::max(kMinDepthChange, sensitivity.sigma)) return std::nullopt;
+  const std::optional<double>& travel = sensitivity.per_percent_travel;
   return Warning{
       "depths-sensitive",
       fmt::format(
-          "the depths change by {:.2g} % where the clock of the poses is off by 10 ms, and by "
-          "{:.2g} % per percent of travel; their own standard deviation is {:.2g} %: are "
-          "clocks and poses as exact as that? ([rig] time_offsets_s, --poses)",
-          100 * sensitivity.per_10_ms, 100 * sensitivity.per_percent_travel,
+          "the depths change by {:.2g} % where the clock of the poses is off by 10 ms{}; their own "
+          "standard deviation is {:.2g} %: are clocks and poses as exact as that? ([rig] "
+          "time_offsets_s, --poses)",
+          100 * sensitivity.per_10_ms,
+          travel ? fmt::format(", and by {:.2g} % per percent of travel", 100 * *travel) : "",
           100 * sensitivity.sigma)};
 }
 

@@ -5,7 +5,6 @@
 #include <mrpt/maps/CSimpleMap.h>
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>

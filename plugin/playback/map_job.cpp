@@ -503,7 +503,6 @@ MapResult mapWindowInto(MapJob given) {
   Job job(std::move(given));
   std::optional<ResultFolder> folder;
   try {
-    job.options.mapper.keyframe.sweep.coarse_to_fine = false;  // its DSI is there to be looked at
     Look look = begin(job, OutputKind::kDepth, folder);
     const EventFusionOptions& options = job.options;
     MapCloud::ConstPtr points;

@@ -164,7 +164,7 @@ TEST_F(Mistakes, AreAmongTheCausesThatEachWarningNames) {
        ofCamera1("distortion_coeffs: []\n  distortion_model: none",
                  "distortion_coeffs: [-0.1, 0, 0, 0]\n  distortion_model: radtan"),
        {"lens"}},
-      {"clock of camera 1", [](DraftRecording&) {}, {"clock"}, "--set rig.time_offsets_s=0,0.01"},
+      {"clock of camera 1", [](DraftRecording&) {}, {"clock"}, "--set rig.time_offsets_s=0,0.012"},
       {"clock of camera 1, more",
        [](DraftRecording&) {},
        {"clock"},

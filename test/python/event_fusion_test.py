@@ -174,7 +174,7 @@ def test_keyframes_can_be_pickled(made):
 
 def test_candidates_are_the_pixels_that_could_have_a_depth(desk):
     t0, t1 = "1.5", "1.75"
-    options = {**OPTIONS, "depth.min_probability": 0.8, "depth.neighbours": True}
+    options = {**OPTIONS, "depth.min_probability": 0.8, "depth.neighbours": True, "performance.coarse_to_fine": False}
     found = ef.candidates(desk, t0, t1, options)
     dsi = ef.dsi(desk, t0, t1, options)
     np.testing.assert_array_equal(found.keyframe.depth, dsi.keyframe.depth)
@@ -606,7 +606,7 @@ def test_a_simulation_has_the_truth_of_its_recording(tmp_path):
     pixels = (simulation.cameras[0].K @ in_camera / in_camera[2])[:2]
     assert np.median(np.hypot(pixels[0] - events["x"][now], pixels[1] - events["y"][now])) < 0.7
     # The keyframe of a window is that of `dsi`; its truth at a time of the folder is the folder's.
-    options = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "dsi.num_planes": 60}
+    options = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "dsi.num_planes": 60, "performance.coarse_to_fine": False}
     window = simulation.start, simulation.start + 10**8, simulation.start + 5 * 10**7
     keyframe = ef.keyframes(simulation.cameras, [events for events, _ in made], simulation.poses(), [window], options)[0]
     assert keyframe.window == window[:2] and keyframe.t == window[2]

@@ -91,7 +91,8 @@ using Sample = std::variant<EventPacket, PoseSample, OtherSample>;
 /// Tick of the poses' times: each pose gets the nearest tick of 100 ns, the resolution of MRPT's
 /// clock. At 300 px/s this is an error of 1.5e-5 px.
 inline constexpr std::int64_t kTickNs = 100;
-/// MRPT's clock counts from 1601. The recording's clock is taken as Unix time.
+/// Ticks of MRPT's clock, which counts from 1601, at the Unix epoch. The recording's clock is taken
+/// as Unix time.
 inline constexpr std::int64_t kMrptTicksAtUnixEpoch = 116'444'736'000'000'000;
 std::int64_t nearestTick(std::int64_t t_ns);
 /// Returns a pose with a rounded rotation: three components of its quaternion are multiples of

@@ -85,7 +85,7 @@ void describePoints(const MapCloud& cloud, RunReport& report);
 
 /// Returns the report as indented JSON: schema (1), events (total and per camera; read = used +
 /// without_pose + outside_window + late + dropped + unselected + filtered + outside_lens +
-/// over_budget), event_uses, votes (the sum of votes is event_uses x planes), keyframes, silent
+/// over_budget), event_uses, votes (their sum is event_uses x planes), keyframes, silent
 /// (keyframes per camera, sub-intervals), points, extent_m (min and max, frame `world`; absent
 /// without points), pixels (see PixelCounts), most_extent_m (the extent of 0.1 to 99.9 % of the
 /// points on each axis), recording_seconds (first event to last event), seconds (real time),

@@ -4,6 +4,7 @@
 #include <zlib.h>
 #include <Eigen/Geometry>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "mapping/base/number_bytes.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/streams/sample.h"
 
 namespace efm {

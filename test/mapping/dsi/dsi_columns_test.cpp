@@ -20,6 +20,20 @@
 namespace efm {
 namespace {
 
+TEST(TileVolume, InterpolatesLinearlyBetweenKnownPlanes) {
+  TileVolume volume(5, 3);
+  volume.setPlane(0, {0, 6, 9});
+  volume.setPlane(3, {3, 0, 9});
+  volume.setPlane(4, {7, 7, 9});
+  volume.interpolate({true, false, false, true, true}, 2);
+  const float expected[5][2] = {{0, 6}, {1, 4}, {2, 2}, {3, 0}, {7, 7}};
+  for (int plane = 0; plane < 5; ++plane) {
+    EXPECT_FLOAT_EQ(volume.plane(plane)[0], expected[plane][0]);
+    EXPECT_FLOAT_EQ(volume.plane(plane)[1], expected[plane][1]);
+  }
+  EXPECT_EQ(volume.plane(1)[2], 0);  // not one of the pixels
+}
+
 class RunningPeaksOn : public ::testing::TestWithParam<VotingKernel> {};
 
 INSTANTIATE_TEST_SUITE_P(Kernels, RunningPeaksOn, ::testing::ValuesIn(availableKernels()),

@@ -91,6 +91,49 @@ TEST_P(KeyframeDefaultsOn, TheNumberOfThreadsChangesNoBit) {
   }
 }
 
+TEST(KeyframeDefaults, SweepCoarsePlanesFirstWhereColumnsOfInversePlanesAreFused) {
+  const MovingEdges recording(2);
+  KeyframeMapperOptions options = defaults();
+  options.planes.num_planes = 200;
+  const KeyframeDepthMap coarse = map(recording, options);
+  EXPECT_GT(coarse.votes.interpolated, coarse.votes.cast / 10);
+  const struct {
+    const char* name;
+    std::function<void(KeyframeMapperOptions&)> change;
+  } kAllPlanes[] = {
+      {"option", [](auto& of) { of.sweep.coarse_to_fine = false; }},
+      {"paper", [](auto& of) { of.extraction.extraction = ExtractionMethod::kPaper; }},
+      {"linear", [](auto& of) { of.planes.spacing = PlaneSpacing::kLinear; }},
+      {"plain", [](auto& of) { of.sweep.kernel = VotingKernel::kPlain; }},
+  };
+  for (const auto& [name, change] : kAllPlanes) {
+    KeyframeMapperOptions changed = options;
+    change(changed);
+    EXPECT_EQ(map(recording, changed).votes.interpolated, 0U) << name;
+  }
+  options.camera_maps = true;
+  EXPECT_TRUE(same(map(recording, options).map, coarse.map));
+  options.camera_maps = false;
+  options.sweep.coarse_to_fine = false;
+  const KeyframeDepthMap all = map(recording, options);
+  EXPECT_EQ(all.votes.total(), coarse.votes.total());
+  const double step = DepthPlanes(kPlanes).inverseDepthStep();
+  int kept[2] = {0, 0};
+  int right[2] = {0, 0};
+  for (const int i : {0, 1}) {
+    const cv::Mat1f& depth = (i == 0 ? coarse : all).map.depth;
+    for (int y = 0; y < depth.rows; ++y) {
+      for (int x = 0; x < depth.cols; ++x) {
+        if (depth(y, x) == 0) continue;
+        ++kept[i];
+        right[i] += recording.offEdge(x, y, depth(y, x), step) <= 1.5 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(kept[0], kept[1] * 97 / 100);
+  EXPECT_GE(right[0] * kept[1], right[1] * kept[0] * 0.99);
+}
+
 /// Counts the workers that join the arena of the thread that constructs this object.
 class WorkersThatCome : public tbb::task_scheduler_observer {
  public:

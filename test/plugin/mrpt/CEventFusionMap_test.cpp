@@ -93,7 +93,7 @@ TEST_F(SimpleMap, IsWhatMrptWritesAndReads) {
   mrpt::maps::CSimpleMap ours;
   ASSERT_TRUE(ours.loadFromFile((folder() / "ours").string()));
   ASSERT_EQ(ours.size(), keyframes.size());
-  // MRPT writes what it has read as we have written it.
+  // MRPT 2.5 writes what it has read as we have written it. A later one may have newer versions.
   EXPECT_EQ(archiveOf(ours), simpleMapArchive(keyframes));
   // The rotation matrix of a quaternion is rounded in another way.
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
