@@ -338,8 +338,7 @@ SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, const DepthPl
   const DepthExtractionOptions& extraction = options_.extraction;
   if (extraction.extraction == ExtractionMethod::kAggregated) {
     request.column_window = extraction.threshold_kernel;
-    // With a sink, the keyframe is that of the whole DSI.
-    if (sweep.coarse_to_fine && !sink && options_.planes.spacing == PlaneSpacing::kInverse) {
+    if (sweep.coarse_to_fine && options_.planes.spacing == PlaneSpacing::kInverse) {
       const double range_px =
           parallax_px_m * (1 / planes.depth(0) - 1 / planes.depth(planes.size() - 1));
       request.coarse_step = coarseStep(planes, view_, range_px);

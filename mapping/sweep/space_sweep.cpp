@@ -278,7 +278,9 @@ class TiledSweep {
     }
     scratch.fused.interpolate(added);
     added.flip();
-    if (!cameras_.empty()) return sweepOnTile(added, false, tile, scratch);
+    if (request_.sink != nullptr || !cameras_.empty()) {
+      return sweepOnTile(added, false, tile, scratch);
+    }
     const auto left_out = static_cast<std::uint64_t>(std::count(added.begin(), added.end(), true));
     const auto swept = static_cast<std::uint64_t>(std::count(coarse.begin(), coarse.end(), true));
     for (std::size_t c = 0; c < after.size(); ++c) {
@@ -364,7 +366,7 @@ std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels) {
 
 SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options, const SweepRequest& request) {
-  assert(request.coarse_step >= 1 && (request.coarse_step == 1 || request.sink == nullptr));
+  assert(request.coarse_step >= 1);
   ThreadArena arena(options.threadsOrCores());
   return arena.execute(
       [&] { return TiledSweep(std::move(cameras), grid, options, request).run(); });

@@ -53,10 +53,10 @@ struct SweepRequest {
   /// Side of a Gaussian window in pixels: odd, at least 3; or 0 for no columns. Pixels get a column
   /// if their confidence is above its mean in the window. Peaks then have only the confidence.
   int column_window = 0;
-  /// At least 1; see `coarseStep`. Above 1, with columns and without a sink: each tile sweeps these
-  /// planes first, then the planes between them where its edges lie (`planesAtEdges`). The columns
-  /// of the other planes are interpolated; each camera's own peaks get all planes. The plain kernel
-  /// sweeps all planes.
+  /// At least 1; see `coarseStep`. Above 1, with columns: each tile sweeps these planes first, then
+  /// the planes between them where its edges lie (`planesAtEdges`). The columns of the other planes
+  /// are interpolated; a sink and each camera's own peaks get all planes. The plain kernel sweeps
+  /// all planes.
   int coarse_step = 1;
 };
 

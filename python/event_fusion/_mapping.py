@@ -467,6 +467,7 @@ class Dsi(tuple):  # type: ignore[type-arg]
         of its own pixel: the values of neighbouring pixels are summed first (``depth.extraction``: aggregated).
     contrast : numpy.ndarray, float32, shape (rows, columns)
         Local contrast of the largest values: above ``depth.min_local_contrast`` a pixel is a candidate for a depth.
+        Exactly so with ``performance.coarse_to_fine = False``: otherwise the depths do not use all planes.
     """
 
     keyframe: Keyframe

@@ -516,8 +516,10 @@ def test_times_are_those_of_the_command_line(desk):
 
 
 def test_the_dsi_is_that_of_the_program(desk, tmp_path):
-    program("depth", DESK, "-q", "--t0", "1.5", "--t1", "1.75", "--save-dsi", "--out", tmp_path / "depth")
-    dsi = ef.dsi(desk, "1.5", "1.75")
+    all_planes = "performance.coarse_to_fine=false"  # the depths are those of the DSI alone
+    window = "--t0", "1.5", "--t1", "1.75"
+    program("depth", DESK, "-q", *window, "--save-dsi", "--set", all_planes, "--out", tmp_path / "depth")
+    dsi = ef.dsi(desk, "1.5", "1.75", {"performance.coarse_to_fine": False})
     values, depths = dsi
     np.testing.assert_array_equal(values, np.load(tmp_path / "depth" / "dsi.npy"))
     assert values.dtype == np.float32 and len(depths) == len(values) and np.all(np.diff(depths) > 0)

@@ -490,7 +490,7 @@ TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCoun
 }
 
 /// Columns of the planes that were swept are those of a sweep of all planes, and interpolated
-/// between them; the cameras' own peaks get all planes.
+/// between them; a sink and the cameras' own peaks get all planes.
 TEST_P(FastSweepOn, CoarseToFineDependsNeitherOnThreadsNorRequestsAndInterpolates) {
   const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
   for (const FusionInputs inputs : {FusionInputs{2, 1, 4}, {3, 1, 2}}) {
@@ -503,12 +503,14 @@ TEST_P(FastSweepOn, CoarseToFineDependsNeitherOnThreadsNorRequestsAndInterpolate
     options.fusion = input.fusion;
     options.kernel = GetParam();
     std::vector<SweepResult> results;
-    for (const bool with_cameras : {false, true}) {
+    for (const bool with_all : {false, true}) {
       for (const int threads : {1, 8}) {
         options.threads = threads;
-        results.push_back(
-            sweepSpace(input.cameras, {input.view, input.planes}, options,
-                       {with_cameras, nullptr, input.groups, input.column_window, 4}));
+        test::WholeDsi dsi(input.planes, input.view);
+        results.push_back(sweepSpace(
+            input.cameras, {input.view, input.planes}, options,
+            {with_all, with_all ? &dsi : nullptr, input.groups, input.column_window, 4}));
+        if (with_all) EXPECT_EQ(dsi.values, all.dsi);
       }
     }
     const SweepResult& alone = results.front();
