@@ -18,14 +18,14 @@ constexpr std::size_t kMinPixels = 200;
 constexpr Coarseness kFineSweep{240, 100'000};
 constexpr double kWithin = 1.15;
 
-/// Appends the ratios of the two depths at the pixels where both maps have a depth.
-void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
-                  std::vector<double>& ratios) {
-  for (int y = 0; y < by_rig_m.rows; ++y) {
-    for (int x = 0; x < by_rig_m.cols; ++x) {
-      const double motion_m = by_motion_m(y, x);
-      const double rig_m = by_rig_m(y, x);
-      if (motion_m > 0 && rig_m > 0) ratios.push_back(motion_m / rig_m);
+/// Appends the ratios of the depths of two maps at the pixels where both have a depth. No ratio if
+/// the first map is empty.
+void appendRatios(const cv::Mat1f& depth_m, const cv::Mat1f& other_m, std::vector<double>& ratios) {
+  for (int y = 0; y < depth_m.rows; ++y) {
+    for (int x = 0; x < depth_m.cols; ++x) {
+      const double depth = depth_m(y, x);
+      const double other = other_m(y, x);
+      if (depth > 0 && other > 0) ratios.push_back(depth / other);
     }
   }
 }
@@ -94,27 +94,19 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
     const cv::Mat1f late = depthsWith(kClockNs, 1, nullptr);
     if (given.empty() || early.empty() || late.empty()) continue;
     std::vector<double> clock, travel, sigma;  // of the pixels
+    appendRatios(early, late, clock);
     for (int y = 0; y < given.rows; ++y) {
       for (int x = 0; x < given.cols; ++x) {
-        if (early(y, x) > 0 && late(y, x) > 0) clock.push_back(std::log(early(y, x) / late(y, x)));
-        if (!(given(y, x) > 0)) continue;
-        sigma.push_back(given(y, x) * std::sqrt(double{variance(y, x)}));
+        if (given(y, x) > 0) sigma.push_back(given(y, x) * std::sqrt(double{variance(y, x)}));
       }
     }
     if (std::min(clock.size(), sigma.size()) < kMinDepths) continue;
-    by_clock.push_back(std::abs(upperMedian(clock)));
+    by_clock.push_back(std::abs(std::log(upperMedian(clock))));
     sigmas.push_back(upperMedian(sigma));
     if (by_clock.back() < kMinDepthChange) continue;
-    const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
-    for (int y = 0; y < farther.rows; ++y) {
-      for (int x = 0; x < farther.cols; ++x) {
-        if (given(y, x) > 0 && farther(y, x) > 0) {
-          travel.push_back(std::log(farther(y, x) / given(y, x)));
-        }
-      }
-    }
+    appendRatios(depthsWith(0, 1 + kTravel, nullptr), given, travel);
     if (travel.size() < kMinDepths) continue;
-    by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
+    by_travel.push_back(std::abs(std::log(upperMedian(travel))) / std::log1p(kTravel));
   }
   if (sigmas.empty()) return std::nullopt;
   DepthSensitivity sensitivity;

@@ -8,6 +8,7 @@
 #include <iomanip>
 #include <locale>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -201,17 +202,29 @@ class PoseCheck {
             [&](const SamplePiece& piece) { return sharpness.of(piece, piece.trajectory); });
   }
 
-  /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
+  /// Returns the gains of the first `count` pieces, without those that have no sharpness.
   /// @param least stops where the mean gain of the pieces so far is lower.
-  Gains gainsOfShift(double shift_s, std::size_t count, double least = 0) {
+  template <typename Sharpness>
+  Gains gainsOfFirst(std::size_t count, double least, Sharpness sharpnessOf) {
     Gains gains;
-    const std::int64_t shift_ns = durationFromSeconds(shift_s);
     for (std::size_t i = 0; i < count && (i == 0 || gains.mean() >= least); ++i) {
+      if (const std::optional<double> sharpness = sharpnessOf(i)) {
+        gains.add(*sharpness, asGiven(i));
+      }
+    }
+    return gains;
+  }
+
+  /// Returns the gains of a time shift of the first `count` pieces, without pieces that lack poses.
+  /// @param least see `gainsOfFirst`.
+  Gains gainsOfShift(double shift_s, std::size_t count, double least = 0) {
+    const std::int64_t shift_ns = durationFromSeconds(shift_s);
+    return gainsOfFirst(count, least, [&](std::size_t i) -> std::optional<double> {
       const SamplePiece& piece = pieces_[i];
       const std::vector<StampedPose>& poses = piece.trajectory.poses();
       if (poses.front().t_ns > piece.window.t0_ns + shift_ns ||
           poses.back().t_ns < piece.window.t1_ns + shift_ns) {
-        continue;
+        return std::nullopt;
       }
       auto known = shifted_.find({shift_ns, i});
       if (known == shifted_.end()) {
@@ -220,9 +233,8 @@ class PoseCheck {
         const double sharpness = shift_ns == 0 ? asGiven(i) : sharpness_.of(piece, moved);
         known = shifted_.emplace(std::pair(shift_ns, i), sharpness).first;
       }
-      gains.add(known->second, asGiven(i));
-    }
-    return gains;
+      return known->second;
+    });
   }
 
   /// Searches the best time shift on the first half of the pieces, from coarse to fine.
@@ -305,13 +317,11 @@ class PoseCheck {
       const auto camera = static_cast<std::size_t>(cameras[i]);
       candidate.finding.camera = camera;
       const auto gainsOf = [&](double shift_s, std::size_t count, double least = 0) {
-        Gains gains;
-        for (std::size_t k = 0; k < count && (k == 0 || gains.mean() >= least); ++k) {
-          SamplePiece piece = pieces_[k];
+        return gainsOfFirst(count, least, [&](std::size_t i) -> std::optional<double> {
+          SamplePiece piece = pieces_[i];
           for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(shift_s);
-          gains.add(sharpness_.of(piece, piece.trajectory), asGiven(k));
-        }
-        return gains;
+          return sharpness_.of(piece, piece.trajectory);
+        });
       };
       const auto ofHalf = [&](double s, double least) { return gainsOf(s, half(), least); };
       if (bestShift({0.03}, ofHalf) == 0) continue;

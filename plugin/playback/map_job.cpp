@@ -16,7 +16,6 @@
 #include "plugin/playback/output_checks.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
-#include "plugin/results/output/simple_map.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/map_picture.h"
 #include "plugin/results/pictures/picture.h"
@@ -406,11 +405,7 @@ void writeMap(Job& job, const MapOutput& output, const MapSnapshot& map,
       output.writeColouredCloud(*map.points, upwardOf(map.trajectory), map.trajectory);
     });
   }
-  write(job, [&] {
-    output.writeFile("map.simplemap", [&](const std::filesystem::path& file) {
-      writeSimpleMap(file, map.keyframes);
-    });
-  });
+  write(job, [&] { output.writeSimpleMap(map.keyframes); });
   write(job, [&] { output.writeTrajectory("trajectory.txt", map.trajectory); });
   if (options.refinement.enabled) {
     write(job, [&] { output.writeTrajectory("trajectory_tracker.txt", map.tracker_trajectory); });

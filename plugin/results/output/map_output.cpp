@@ -13,6 +13,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/results/output/result_folder.h"
+#include "plugin/results/output/simple_map.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/picture.h"
 
@@ -112,9 +113,9 @@ void MapOutput::writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d&
   writeText("map.ply", [&](std::ostream& file) { writePlyTo(file, cloud, colours, views); });
 }
 
-void MapOutput::writeFile(const std::string& name,
-                          const std::function<void(const std::filesystem::path&)>& write) const {
-  efm::write(folder_ / name, write);
+void MapOutput::writeSimpleMap(const std::vector<StoredKeyframe>& keyframes) const {
+  efm::write(folder_ / "map.simplemap",
+             [&](const std::filesystem::path& file) { efm::writeSimpleMap(file, keyframes); });
 }
 
 void MapOutput::writePicture(const std::string& name, const cv::Mat3b& picture) const {

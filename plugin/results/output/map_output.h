@@ -12,6 +12,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/map_point.h"
+#include "plugin/session/map_snapshot.h"
 
 namespace efm {
 
@@ -50,9 +51,8 @@ class MapOutput {
   /// @param upward a unit vector, frame `world`. @param views the keyframes of the cloud.
   void writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward,
                           const std::vector<StampedPose>& views) const;
-  /// Writes a file by a function. @param name "map.simplemap".
-  void writeFile(const std::string& name,
-                 const std::function<void(const std::filesystem::path&)>& write) const;
+  /// Writes map.simplemap, for MRPT's programs: see `simpleMapArchive`.
+  void writeSimpleMap(const std::vector<StoredKeyframe>& keyframes) const;
   /// Writes a picture. @param name "map.png" or "overview.png".
   void writePicture(const std::string& name, const cv::Mat3b& picture) const;
   /// Writes a text by a function. @param name "map.html" or "report.json".
