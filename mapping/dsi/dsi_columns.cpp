@@ -22,26 +22,24 @@ DsiPeaks unwrittenPeaks(const ReferenceView& view, bool confidence_alone) {
   return {cv::Mat1f(size), cv::Mat1i(size), cv::Mat1f(size), cv::Mat1f(size)};
 }
 
-RunningPeaks::RunningPeaks(std::size_t pixels, VotingKernel kernel)
-    : functions_(&kernels::peakFunctions(kernel)),
-      best_(pixels, kNoValue),
-      before_(pixels, kNoValue),
-      after_(pixels, kNoValue),
-      plane_(pixels, -1),
-      previous_(pixels, kNoValue) {}
+RunningPeaks::RunningPeaks(std::size_t pixels, VotingKernel kernel, bool neighbours)
+    : functions_(&kernels::peakFunctions(kernel)), best_(pixels, kNoValue), plane_(pixels, -1) {
+  if (!neighbours) return;
+  for (PlaneValues* values : {&before_, &after_, &previous_}) values->assign(pixels, kNoValue);
+}
 
-void RunningPeaks::add(int plane, const PlaneValues& values) {
-  assert(values.size() == best_.size());
-  functions_->add({best_.data(), plane_.data(), before_.data(), after_.data(), previous_.data()},
-                  plane, values.data(), values.size());
+void RunningPeaks::add(int plane, const float* values) {
+  const auto add = previous_.empty() ? functions_->addAlone : functions_->add;
+  add({best_.data(), plane_.data(), before_.data(), after_.data(), previous_.data()}, plane, values,
+      best_.size());
 }
 
 void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {
-  efm::writeTo(images.confidence(tile), best_);
+  efm::writeTo(images.confidence(tile), best_.data());
   if (images.plane.empty()) return;
-  efm::writeTo(images.plane(tile), plane_);
-  efm::writeTo(images.before(tile), before_);
-  efm::writeTo(images.after(tile), after_);
+  efm::writeTo(images.plane(tile), plane_.data());
+  efm::writeTo(images.before(tile), before_.data());
+  efm::writeTo(images.after(tile), after_.data());
 }
 
 namespace {
@@ -89,9 +87,8 @@ cv::Mat1f surroundingsOf(const cv::Mat1f& confidence, int window) {
 }
 
 void TileVolume::setPlane(int plane, const PlaneValues& values) {
-  assert(values.size() <= pixels_);
-  std::copy(values.begin(), values.end(),
-            values_.data() + static_cast<std::size_t>(plane) * pixels_);
+  assert(values.size() <= stride_);
+  std::copy(values.begin(), values.end(), this->plane(plane));
 }
 
 void TileVolume::interpolate(const std::vector<bool>& known, std::size_t pixels) {
@@ -102,7 +99,7 @@ void TileVolume::interpolate(const std::vector<bool>& known, std::size_t pixels)
     const float* last = plane(static_cast<int>(after));
     for (std::size_t at = before + 1; at < after; ++at) {
       const float weight = static_cast<float>(at - before) / static_cast<float>(after - before);
-      float* values = values_.data() + at * pixels_;
+      float* values = plane(static_cast<int>(at));
       for (std::size_t i = 0; i < pixels; ++i) {
         values[i] = first[i] + weight * (last[i] - first[i]);
       }

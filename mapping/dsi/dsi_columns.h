@@ -31,15 +31,17 @@ struct DsiPeaks {
 DsiPeaks unwrittenPeaks(const ReferenceView& view, bool confidence_alone = false);
 
 /// The peak of each pixel of a tile over the planes added so far: the argmax of the DSI (Ghosh and
-/// Gallego 2022, Algorithm 1, line 5), and the values one plane before and after it.
+/// Gallego 2022, Algorithm 1, line 5), and if required the values one plane before and after it.
 class RunningPeaks {
  public:
-  /// @param kernel one of `availableKernels`; all kernels give the same bits.
-  explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel());
+  /// @param kernel one of `availableKernels`; all kernels give the same bits. @param neighbours
+  /// true to keep the values beside the peak, which takes twice the time.
+  explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel(),
+                        bool neighbours = true);
 
-  /// Adds a plane. Planes are added in increasing order, without a gap; in any order if only the
-  /// confidence is needed.
-  void add(int plane, const PlaneValues& values);
+  /// Adds a plane. Planes are added in increasing order, without a gap; in any order without
+  /// neighbours. @param values one per pixel.
+  void add(int plane, const float* values);
   /// Return the largest value of each pixel, below 0 without a plane, and its plane.
   const PlaneValues& confidence() const { return best_; }
   const PixelValues<std::int32_t>& planes() const { return plane_; }
@@ -50,9 +52,10 @@ class RunningPeaks {
  private:
   const kernels::PeakFunctions* functions_;
   PlaneValues best_;
+  PixelValues<std::int32_t> plane_;
+  // Empty without neighbours.
   PlaneValues before_;
   PlaneValues after_;
-  PixelValues<std::int32_t> plane_;
   PlaneValues previous_;  // values of the plane added last
 };
 
@@ -60,19 +63,21 @@ class RunningPeaks {
 class TileVolume {
  public:
   TileVolume(int planes, std::size_t pixels)
-      : pixels_(pixels), values_(static_cast<std::size_t>(planes) * pixels) {}
+      : stride_(pixels + kernels::kSumPadding),
+        values_(static_cast<std::size_t>(planes) * stride_) {}
 
-  bool empty() const { return values_.empty(); }
   void setPlane(int plane, const PlaneValues& values);
   /// Sets the first `pixels` values of all other planes: interpolated between the planes before and
   /// after. @param known one flag per plane; true for the first and the last plane.
   void interpolate(const std::vector<bool>& known, std::size_t pixels);
+  /// Returns the values of a plane, with kernels::kSumPadding.
+  float* plane(int plane) { return values_.data() + static_cast<std::size_t>(plane) * stride_; }
   const float* plane(int plane) const {
-    return values_.data() + static_cast<std::size_t>(plane) * pixels_;
+    return values_.data() + static_cast<std::size_t>(plane) * stride_;
   }
 
  private:
-  std::size_t pixels_;
+  std::size_t stride_;
   PlaneValues values_;
 };
 

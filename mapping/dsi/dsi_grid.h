@@ -22,11 +22,9 @@ template <typename Value>
 using PixelValues = std::vector<Value, tbb::cache_aligned_allocator<Value>>;
 using PlaneValues = PixelValues<float>;
 
-/// Writes the values of a tile into its part of an image.
+/// Writes the values of a tile, row-major, into its part of an image.
 template <typename Value>
-void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
-  assert(values.size() == part.total());
-  auto row = values.begin();
+void writeTo(cv::Mat_<Value> part, const Value* row) {
   for (int y = 0; y < part.rows; ++y, row += part.cols) std::copy_n(row, part.cols, part[y]);
 }
 

@@ -108,10 +108,16 @@ struct PeakArrays {
 };
 
 struct PeakFunctions {
+  using Add = void (*)(const PeakArrays& peaks, std::int32_t plane, const float* values,
+                       std::size_t n);
   /// Adds the n values of a plane. Planes are added in increasing order, without a gap.
-  void (*add)(const PeakArrays& peaks, std::int32_t plane, const float* values,
-              std::size_t n) = nullptr;
+  Add add = nullptr;
+  /// Adds them to `best` and `plane` alone, in any order of the planes.
+  Add addAlone = nullptr;
 };
+
+/// Vectors may read, and write back, this number of values past the end of a sum.
+inline constexpr std::size_t kSumPadding = 16;
 
 /// @param kernel one of `availableKernels`; all kernels give the same bits.
 const PeakFunctions& peakFunctions(VotingKernel kernel);

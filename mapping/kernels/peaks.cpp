@@ -46,13 +46,33 @@ HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays
   return i;
 }
 
-// Adds full vectors first, then the rest in vectors of one lane.
+/// As `addBy`, without the neighbours.
+template <class D>
+HWY_INLINE std::size_t addAloneBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
+                                  std::int32_t plane, const float* values) {
+  const hn::RebindToSigned<D> d_plane;
+  const auto this_plane = hn::Set(d_plane, plane);
+  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
+    const auto value = hn::LoadU(d, values + i);
+    const auto best = hn::LoadU(d, peaks.best + i);
+    hn::StoreU(hn::Max(value, best), d, peaks.best + i);
+    storeWhere(d_plane, hn::RebindMask(d_plane, hn::Gt(value, best)), this_plane, peaks.plane + i);
+  }
+  return i;
+}
+
+// Full vectors are added first, then the rest in vectors of one lane.
 void add(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
   const std::size_t done = addBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
   addBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
 }
 
-constexpr PeakFunctions kPeaks = {add};
+void addAlone(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
+  const std::size_t done = addAloneBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
+  addAloneBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
+}
+
+constexpr PeakFunctions kPeaks = {add, addAlone};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -78,7 +98,16 @@ void addPlain(const PeakArrays& peaks, std::int32_t plane, const float* values, 
   }
 }
 
-constexpr PeakFunctions kPlainPeaks = {addPlain};
+void addAlonePlain(const PeakArrays& peaks, std::int32_t plane, const float* values,
+                   std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(values[i] > peaks.best[i])) continue;
+    peaks.best[i] = values[i];
+    peaks.plane[i] = plane;
+  }
+}
+
+constexpr PeakFunctions kPlainPeaks = {addPlain, addAlonePlain};
 
 }  // namespace
 

@@ -114,9 +114,6 @@ struct TileFunctions {
 /// @param kernel one of `availableKernels`, but not plain: it needs no tiles.
 const TileFunctions& tileFunctions(VotingKernel kernel);
 
-/// Vectors may read, and write back, this number of values past the end of a sum.
-inline constexpr std::size_t kSumPadding = 16;
-
 /// Turns the cells of a tile into its ray densities: the bilinear votes of Ghosh and Gallego 2022,
 /// Eq. 2. The first pixel is right of and below the first cell. A tile has at most kTileCells - 1
 /// pixels per side. All cells are zero afterwards.

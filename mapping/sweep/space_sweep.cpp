@@ -177,6 +177,7 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
+  TileVolume not_added;  // a plane that the peaks do not get
   std::vector<TilePeaks> cameras;  // empty if not requested
   std::vector<std::uint64_t>
       interpolated;  // by camera: VoteCounts::interpolated, in units of weight
@@ -191,7 +192,7 @@ class WholePlanes {
   }
 
   /// Several threads may write different tiles.
-  void write(int plane, const cv::Rect& tile, const PlaneValues& values) {
+  void write(int plane, const cv::Rect& tile, const float* values) {
     if (sink_ != nullptr) writeTo(planes_[static_cast<std::size_t>(plane)](tile), values);
   }
   void deliver() {
@@ -239,14 +240,14 @@ class TiledSweep {
 
  private:
   Scratch newScratch() const {
-    TilePeaks peaks(grid_.planes.size(), request_.column_window,
-                    TileCells::kMaxPixels * TileCells::kMaxPixels);
+    constexpr std::size_t kPixels = TileCells::kMaxPixels * TileCells::kMaxPixels;
+    TilePeaks peaks(grid_.planes.size(), request_.column_window, kPixels);
     const auto keep =
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
     std::vector<TilePeaks> cameras(cameras_.size(), peaks);
     return {std::vector<TileRays>(rays_.inputs()),
             TileFusion(options_.fusion, inputs_, keep, kernel_), std::move(peaks),
-            std::move(cameras),
+            TileVolume(1, kPixels), std::move(cameras),
             std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 
@@ -310,8 +311,9 @@ class TiledSweep {
   }
 
   void sweepPlane(int plane, bool adds, const cv::Rect& tile, Scratch& scratch) {
-    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, rays_.fromPixels(plane));
-    if (adds) scratch.fused.add(plane, fused);
+    float* fused = adds ? scratch.fused.plane(plane) : scratch.not_added.plane(0);
+    scratch.fusion.fuse(scratch.rays, rays_.fromPixels(plane), fused);
+    if (adds) scratch.fused.add(plane);
     for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
       scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));
     }

@@ -118,17 +118,18 @@ class TileFusion {
              VotingKernel kernel);
 
   void moveTo(const TileCells& tile);
-  /// Returns the fused plane, valid until the next call.
+  /// Fuses a plane.
   /// @param rays padded: input (camera, slot) is at camera * slots_per_group * groups + slot.
   /// @param from_pixels from the plane of the rays' pixels to this plane, 1/m.
-  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_pixels);
+  /// @param fused one value per pixel, with kernels::kSumPadding.
+  void fuse(std::vector<TileRays>& rays, double from_pixels, float* fused);
   /// Returns a camera's own plane after `fuse`. Needs `PlaneFusion::Keep::kCameras`.
   const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
   /// Returns the weights of each camera's votes on all tiles and planes so far, in units.
   const std::vector<std::uint64_t>& units() const { return units_; }
 
  private:
-  const PlaneValues& fusePairs(std::vector<TileRays>& rays, double from_pixels);
+  void fusePairs(std::vector<TileRays>& rays, double from_pixels, float* fused);
 
   FusionOptions options_;
   FusionInputs inputs_;
@@ -137,8 +138,9 @@ class TileFusion {
   // The second accumulator is for the shortcut.
   std::array<TileAccumulator, 2> accumulators_;
   std::optional<PlaneFusion> planes_;
-  PlaneValues sum_, group_sum_;  // for the shortcut
-  std::vector<bool> skips_;      // by slot: true if marks made it skip many pixels of this tile
+  std::size_t pixels_ = 0;   // of the tile
+  PlaneValues group_sum_;    // for the shortcut
+  std::vector<bool> skips_;  // by slot: true if marks made it skip many pixels of this tile
   std::vector<std::uint64_t> units_;
 };
 
@@ -172,16 +174,19 @@ class TilePeaks {
  public:
   /// @param max_pixels the largest number of pixels of a tile.
   TilePeaks(int planes, int column_window, std::size_t max_pixels)
-      : volume_(column_window > 0 ? planes : 0, column_window > 0 ? max_pixels : 0) {}
+      : columns_(column_window > 0), volume_(columns_ ? planes : 1, max_pixels) {}
 
   void moveTo(const cv::Rect& tile, VotingKernel kernel) {
     tile_ = tile;
-    peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
+    peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel, !columns_);
   }
+  /// Returns the memory of a plane, with kernels::kSumPadding: write its values, then `add` it.
+  float* plane(int plane) { return volume_.plane(columns_ ? plane : 0); }
   /// Adds a plane. Planes are added in increasing order, without a gap; in any order with columns.
+  void add(int plane) { peaks_->add(plane, this->plane(plane)); }
   void add(int plane, const PlaneValues& values) {
-    peaks_->add(plane, values);
-    if (!volume_.empty()) volume_.setPlane(plane, values);
+    volume_.setPlane(columns_ ? plane : 0, values);
+    add(plane);
   }
   const RunningPeaks& peaks() const { return *peaks_; }
   /// Interpolates the planes that were not added. Needs columns. @param added one flag per plane.
@@ -191,15 +196,16 @@ class TilePeaks {
   /// Writes the tile to its position in the view. Several threads may write different tiles.
   void writeTo(ViewPeaks& view, std::size_t tile) const {
     peaks_->writeTo(view.peaks_, tile_);
-    if (volume_.empty()) return;
+    if (!columns_) return;
     view.columns_[tile] = DsiColumns::select(tile_, view.peaks_.confidence(tile_), volume_,
                                              view.planes_, view.column_window_);
   }
 
  private:
+  bool columns_;
   cv::Rect tile_;
   std::optional<RunningPeaks> peaks_;
-  TileVolume volume_;
+  TileVolume volume_;  // without columns, of one plane
 };
 
 }  // namespace efm

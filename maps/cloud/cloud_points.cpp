@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#define PCL_NO_PRECOMPILE  // see EfmPcl.cmake
 #include "maps/cloud/cloud_points.h"
 
 #include <pcl/filters/radius_outlier_removal.h>

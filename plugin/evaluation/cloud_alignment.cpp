@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#define PCL_NO_PRECOMPILE  // see EfmPcl.cmake
 #include "plugin/evaluation/cloud_evaluation.h"
 
 #include <fmt/format.h>
@@ -7,14 +8,18 @@
 #include <pcl/kdtree/kdtree_flann.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <pcl/registration/correspondence_rejection_median_distance.h>
+#include <pcl/registration/correspondence_rejection.h>
 #include <pcl/registration/icp.h>
 #include <pcl/registration/transformation_estimation_point_to_plane_lls.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
+#include <vector>
+
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {
@@ -33,6 +38,26 @@ constexpr double kLastStepRad = 1e-6;
 /// ICP that gives access to the points that it used.
 struct Icp : pcl::IterativeClosestPoint<PclPoint, PclPoint, double> {
   const pcl::Correspondences& used() const { return *correspondences_; }
+};
+
+/// Rejects pairs of points that are more than three times the median distance apart.
+class FarFromMedian : public pcl::registration::CorrespondenceRejector {
+ public:
+  void getRemainingCorrespondences(const pcl::Correspondences& pairs,
+                                   pcl::Correspondences& remaining) override {
+    std::vector<float> squared_distances;
+    for (const pcl::Correspondence& pair : pairs) squared_distances.push_back(pair.distance);
+    remaining.clear();
+    if (pairs.empty()) return;
+    const float limit = 9 * upperMedian(squared_distances);
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(remaining),
+                 [limit](const pcl::Correspondence& pair) { return pair.distance <= limit; });
+  }
+
+ private:
+  void applyRejection(pcl::Correspondences& remaining) override {
+    getRemainingCorrespondences(*input_correspondences_, remaining);
+  }
 };
 
 std::runtime_error undetermined() {
@@ -147,9 +172,7 @@ CloudAlignment alignCloud(const std::vector<CloudPoint>& map,
   icp.setInputSource(points);
   icp.setInputTarget(surfaces);
   icp.setTransformationEstimation(pcl::make_shared<CheckedPointToPlane>());
-  auto within = pcl::make_shared<pcl::registration::CorrespondenceRejectorMedianDistance>();
-  within->setMedianFactor(9);  // factor of squared distances: 3 of distances
-  icp.addCorrespondenceRejector(within);
+  icp.addCorrespondenceRejector(pcl::make_shared<FarFromMedian>());
   icp.setMaximumIterations(kMaxRounds);
   icp.setTransformationEpsilon(kLastStepM * kLastStepM);
   icp.setTransformationRotationEpsilon(std::cos(kLastStepRad));

@@ -56,7 +56,7 @@ void addPeaks(benchmark::State& state, VotingKernel kernel, std::size_t voxels) 
   for (auto _ : state) {
     RunningPeaks peaks(voxels, kernel);
     for (int plane = 0; plane < kPlanes; ++plane) {
-      peaks.add(plane, values[static_cast<unsigned>(plane) % kDifferent]);
+      peaks.add(plane, values[static_cast<unsigned>(plane) % kDifferent].data());
     }
     benchmark::DoNotOptimize(peaks);
   }

@@ -45,13 +45,16 @@ TEST_P(RunningPeaksOn, AreTheFirstLargestValueOfEachPixelAndItsNeighbours) {
     test::ChosenDsi dsi({width, 1}, 12);
     for (float& value : dsi.values) value = static_cast<float>(random() % 6);  // many equal values
     RunningPeaks peaks(static_cast<std::size_t>(width), GetParam());
+    RunningPeaks alone(static_cast<std::size_t>(width), GetParam(), false);
     for (int plane = 0; plane < dsi.planes; ++plane) {
-      const auto begin = dsi.values.begin() + plane * width;
-      peaks.add(plane, PlaneValues(begin, begin + width));
+      peaks.add(plane, dsi.values.data() + plane * width);
+      alone.add(plane, dsi.values.data() + plane * width);
     }
     DsiPeaks images = unwrittenPeaks(ReferenceView{width, 1, 1, 1, 0, 0});
     peaks.writeTo(images, {0, 0, width, 1});
     EXPECT_TRUE(test::same(images, dsi.swept().peaks)) << width << " pixels";
+    EXPECT_EQ(alone.confidence(), peaks.confidence());
+    EXPECT_EQ(alone.planes(), peaks.planes());
   }
 }
 

@@ -59,7 +59,7 @@ class PlanesAtEdges : public ::testing::Test {
   /// Returns the planes between the coarse planes beside vertical edges on coarse planes.
   static std::vector<int> of(const std::vector<Edge>& edges, float everywhere) {
     const PlaneSet coarse = coarsePlanes(kPlanes, 3);
-    RunningPeaks peaks(static_cast<std::size_t>(kTile.area()));
+    RunningPeaks peaks(static_cast<std::size_t>(kTile.area()), fastestKernel(), false);
     for (const int plane : planesOf(coarse)) {
       PlaneValues values(static_cast<std::size_t>(kTile.area()), everywhere);
       for (const Edge& edge : edges) {
@@ -68,7 +68,7 @@ class PlanesAtEdges : public ::testing::Test {
           values[static_cast<std::size_t>(y * kTile.width + edge.column)] += edge.contrast;
         }
       }
-      peaks.add(plane, values);
+      peaks.add(plane, values.data());
     }
     return planesOf(planesAtEdges(coarse, peaks, kTile, 5));
   }
