@@ -33,6 +33,56 @@ constexpr std::uint32_t kBitsOfZero = 0x4B000000U;
 
 // ---------------------------------------------------------------- gathering
 
+/// Moves the lanes with a true mask to the front. The same lanes of several vectors are moved.
+class LanesToFront {
+ public:
+  template <class Mask>
+  explicit HWY_INLINE LanesToFront(Mask mask)
+#if HWY_TARGET == HWY_AVX3
+      : mask_(mask) {
+  }
+  HWY_INLINE FloatV operator()(FloatV values) const { return hn::Compress(values, mask_); }
+
+ private:
+  hn::Mask<Floats> mask_;
+#else
+      : indices_(hn::SetTableIndices(Floats(), table().lanes[bitsOf(mask)])) {
+  }
+  HWY_INLINE FloatV operator()(FloatV values) const {
+    return hn::TableLookupLanes(values, indices_);
+  }
+
+ private:
+  // Highway's Compress copies its table to the stack at each call.
+  static constexpr std::size_t kLanes = hn::MaxLanes(Floats());
+  struct Table {
+    alignas(64) std::int32_t lanes[std::size_t{1} << kLanes][kLanes];
+  };
+  static constexpr Table makeTable() {
+    Table table{};
+    for (std::size_t bits = 0; bits < std::size_t{1} << kLanes; ++bits) {
+      std::size_t front = 0;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        if ((bits >> lane & 1) != 0) table.lanes[bits][front++] = static_cast<std::int32_t>(lane);
+      }
+    }
+    return table;
+  }
+  static const Table& table() {
+    static constexpr Table kTable = makeTable();
+    return kTable;
+  }
+  template <class Mask>
+  static HWY_INLINE std::size_t bitsOf(Mask mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(Floats(), mask, bits);
+    return bits[0];
+  }
+
+  decltype(hn::SetTableIndices(Floats(), static_cast<const std::int32_t*>(nullptr))) indices_;
+#endif
+};
+
 std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest& request,
                    const MovingRays& rays) {
   const Floats d;
@@ -55,9 +105,11 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
     const auto along = hn::And(hn::Ge(hn::Max(y0, y1), set(request.top)),
                                hn::Lt(hn::Min(y0, y1), set(request.bottom)));
     const auto near = hn::And(hn::And(across, along), hn::FirstN(d, count - i));
+    if (hn::AllFalse(d, near)) continue;
     // Whole vectors are stored, also into the padding: compressing directly into memory is slower.
+    const LanesToFront to_front(near);
     const auto append = [&](FloatV values, float* to) {
-      hn::StoreU(hn::Compress(values, near), d, to + size);
+      hn::StoreU(to_front(values), d, to + size);
     };
     const FloatV pixel_x = hn::MulAdd(set(request.to_pixels), dx, x);
     const FloatV pixel_y = hn::MulAdd(set(request.to_pixels), dy, y);

@@ -277,8 +277,13 @@ class PoseCheck {
         shifts_s.push_back(s);
       }
     }
-    const double best_s =
+    double best_s =
         bestShift(shifts_s, [&](double s, double least) { return gainsOfShift(s, half(), least); });
+    // A gain that is too small for a report is noise if the poses are clearly right.
+    if (is_clear &&
+        gainsOfShift(best_s, pieces_.size()).mean() < minGain(PoseMistake::kTimeShift)) {
+      best_s = 0;
+    }
     // The clock of clearly right poses needs no proof by the other half of the pieces.
     const std::size_t count = is_clear && best_s == 0 ? half() : pieces_.size();
     const auto gainsOf = [&](double s) {
@@ -514,15 +519,17 @@ class PoseCheck {
     return mistake == PoseMistake::kTimeShift || mistake == PoseMistake::kCameraClock;
   }
 
+  double minGain(PoseMistake mistake) const {
+    if (isShift(mistake)) return severalCameras() ? kMinShiftGain : kMinShiftGainOfOne;
+    if (mistake != PoseMistake::kPixels) return kMinGain;
+    return severalCameras() ? kMinPixelGain : kMinPixelGainOfOne;
+  }
+
   /// Returns whether a mistake explains the events, on both halves of the data.
   bool isClear(const Candidate& candidate) const {
     const PoseMistake mistake = candidate.finding.mistake;
     const bool shift = isShift(mistake);
-    double min_gain = kMinGain;
-    if (shift) min_gain = severalCameras() ? kMinShiftGain : kMinShiftGainOfOne;
-    if (mistake == PoseMistake::kPixels) {
-      min_gain = severalCameras() ? kMinPixelGain : kMinPixelGainOfOne;
-    }
+    const double min_gain = minGain(mistake);
     const std::size_t n = pieces_.size();
     if (n < 2 || (shift && std::abs(candidate.finding.shift_s) < kMinShiftS)) return false;
     if (!candidate.is_peak || candidate.gains.mean() < min_gain) return false;

@@ -64,6 +64,7 @@ PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid) {
     return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
   };
   // Forward rays run from their camera to farther planes, backward rays to nearer planes.
+  if (in_front(packet.forward ? 0 : count - 1)) return {grid.planes, 0, count};
   int begin = 0;
   int end = count;
   while (begin < end) {
@@ -293,6 +294,8 @@ std::pair<std::size_t, std::size_t> RayBins::Footprint::Side::binsIn(float min, 
 void RayBins::gather(const Footprint& footprint, const TileCells& tile,
                      const kernels::TileFunctions& functions, TileRays& rays) const {
   constexpr double kRounding_px = 0.01;
+  constexpr std::uint32_t kRaysPerLine = 64 / sizeof(kernels::BinnedRay);
+  constexpr std::uint32_t kPrefetchedRays = 64 * kRaysPerLine;
   const cv::Rect& cells = tile.in_view;
   const auto narrow = [](double value) { return static_cast<float>(value); };
   kernels::GatherRequest request;
@@ -312,6 +315,13 @@ void RayBins::gather(const Footprint& footprint, const TileCells& tile,
     const std::size_t bin = row * columns_.bins();
     const std::uint32_t begin = begin_[bin + first_column];
     const std::size_t count = begin_[bin + end_column] - begin;
+    if (row + 1 < end_row) {  // rows are far apart in memory
+      const std::uint32_t* next = &begin_[bin + columns_.bins()];
+      const std::uint32_t end = std::min(next[end_column], next[first_column] + kPrefetchedRays);
+      for (std::uint32_t ray = next[first_column]; ray < end; ray += kRaysPerLine) {
+        __builtin_prefetch(&rays_[ray]);
+      }
+    }
     if (count == 0) continue;
     rays.reserve(count);
     rays.resize(functions.gather(rays_.data() + begin, count, request, rays.view()));

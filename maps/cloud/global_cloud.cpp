@@ -267,9 +267,10 @@ void GlobalCloud::finalize(std::uint64_t below) {
 }
 
 std::size_t GlobalCloud::unfinalizedVoxels(std::uint64_t below) const {
+  constexpr std::size_t kVoxelsPerKeyframe = 10;  // by memory
   std::size_t count = 0;
   for (auto at = keyframes_.begin(); at != keyframes_.end() && at->first < below; ++at) {
-    count += at->second.voxels.size();
+    count += kVoxelsPerKeyframe + at->second.voxels.size();
   }
   return count;
 }

@@ -114,7 +114,13 @@ void RefinedCloud::finalize() {
   const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
   if (newest < movable_ || newest - movable_ < kCheckers) return;
   const std::uint64_t below = newest - movable_ - kCheckers;
-  if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) return;
+  if (below < next_look_) return;
+  if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) {
+    constexpr std::uint64_t kParts = 20;  // the cost of a look grows with the keyframes
+    next_look_ = below + (below - finalized_below_) / kParts + 1;
+    return;
+  }
+  finalized_below_ = below;
   const std::uint64_t first_movable = below + kCheckers;
   if (movable_ > 0 && first_movable > fixed_) freeze(first_movable - fixed_);
   cloud_.finalize(below);

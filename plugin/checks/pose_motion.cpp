@@ -47,22 +47,29 @@ Velocity meanOf(const Velocity& a, const Velocity& b) {
   return {(a.linear + b.linear) / 2, (a.angular + b.angular) / 2};
 }
 
+/// Compares times. Trackers may have 100,000 poses a second, so they are searched by halves.
+struct IsBefore {
+  bool operator()(std::int64_t t_ns, const StampedPose& pose) const { return t_ns < pose.t_ns; }
+  bool operator()(const StampedPose& pose, std::int64_t t_ns) const { return pose.t_ns < t_ns; }
+};
+constexpr IsBefore isBefore;
+
 /// Returns the velocity before a pose, over a number of steps and, if there are more poses, a time.
 std::optional<Velocity> velocityBefore(const Poses& poses, std::size_t last, std::int64_t reach_ns,
                                        std::size_t steps) {
   if (last < steps) return std::nullopt;
-  std::size_t first = last - steps;
-  while (first > 0 && poses[last].t_ns - poses[first].t_ns < reach_ns) --first;
-  return velocityOf(poses[first], poses[last]);
+  const auto end = poses.begin() + static_cast<std::ptrdiff_t>(last - steps + 1);
+  const auto after = std::upper_bound(poses.begin(), end, poses[last].t_ns - reach_ns, isBefore);
+  return velocityOf(after == poses.begin() ? *after : *(after - 1), poses[last]);
 }
 
 /// Returns the velocity after a pose.
 std::optional<Velocity> velocityAfter(const Poses& poses, std::size_t first, std::int64_t reach_ns,
                                       std::size_t steps) {
-  std::size_t last = first + steps;
-  if (last >= poses.size()) return std::nullopt;
-  while (last + 1 < poses.size() && poses[last].t_ns - poses[first].t_ns < reach_ns) ++last;
-  return velocityOf(poses[first], poses[last]);
+  if (first + steps >= poses.size()) return std::nullopt;
+  const auto begin = poses.begin() + static_cast<std::ptrdiff_t>(first + steps);
+  const auto last = std::lower_bound(begin, poses.end(), poses[first].t_ns + reach_ns, isBefore);
+  return velocityOf(poses[first], last == poses.end() ? poses.back() : *last);
 }
 
 MotionAmount speedOf(const Velocity& velocity) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mapping/depth/peak_fit.h"
 
@@ -61,9 +62,12 @@ std::string badKeyframesText(const std::vector<std::size_t>& keyframes) {
 
 }  // namespace
 
-void QualityStatistics::add(const KeyframeDepthMap& keyframe, const QualityFacts& facts) {
+QualityStatistics::Judged QualityStatistics::judge(const KeyframeDepthMap& keyframe,
+                                                   const QualityFacts& facts) {
+  if (keyframes_.size() == keyframes_.capacity()) keyframes_.reserve(2 * keyframes_.size() + 1);
   const DepthMap& map = keyframe.map;
-  Keyframe& added = keyframes_.emplace_back();
+  Judged judged;
+  Keyframe& added = judged.keyframe;
   std::vector<double> depths_m, errors;
   double wrong = 0, too_far = 0;
   std::uint32_t known = 0;
@@ -88,11 +92,17 @@ void QualityStatistics::add(const KeyframeDepthMap& keyframe, const QualityFacts
     added.parallax_px = static_cast<float>(keyframe.parallax_px_m / upperMedian(depths_m));
   }
   added.before = sharedWithLast(keyframe);
-  pixels_ += map.pixels;
-  last_ = {};
-  last_.map.depth = map.depth;
-  last_.view = keyframe.view;
-  last_.T_world_ref = keyframe.T_world_ref;
+  judged.pixels = map.pixels;
+  judged.of.map.depth = map.depth;
+  judged.of.view = keyframe.view;
+  judged.of.T_world_ref = keyframe.T_world_ref;
+  return judged;
+}
+
+void QualityStatistics::add(Judged judged) noexcept {
+  keyframes_.push_back(judged.keyframe);
+  pixels_ += judged.pixels;
+  last_ = std::move(judged.of);
 }
 
 /// Projects the points of the last keyframe into this keyframe, and compares depths.
@@ -133,6 +143,15 @@ double QualityStatistics::usualHits() const {
     if (shared.in_view >= kMinShared) hits.push_back(ratio(shared.points, shared.in_view));
   }
   return hits.empty() ? 0 : upperMedian(hits);
+}
+
+double QualityStatistics::rightShareOf(std::size_t keyframe) {
+  constexpr std::size_t kParts = 20;
+  if (keyframes_.size() > usual_of_ + usual_of_ / kParts) {
+    usual_hits_ = usualHits();
+    usual_of_ = keyframes_.size();
+  }
+  return rightShareOf(keyframe, usual_hits_);
 }
 
 double QualityStatistics::rightShareOf(std::size_t keyframe, double usual_hits) const {

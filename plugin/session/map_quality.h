@@ -64,18 +64,6 @@ std::string textOf(const MapQuality& quality);
 /// Judges keyframes one after another by their probabilities, and by the points that consecutive
 /// keyframes share.
 class QualityStatistics {
- public:
-  void add(const KeyframeDepthMap& keyframe, const QualityFacts& facts);
-  /// Returns the predicted fraction of right depths of a keyframe, from it and the keyframes before
-  /// and after it that were added.
-  double rightShareOf(std::size_t keyframe) const { return rightShareOf(keyframe, usualHits()); }
-  std::size_t keyframes() const { return keyframes_.size(); }
-
-  /// @param planes of the map. @param num_cameras number of cameras that took part.
-  MapQuality quality(const QualityFacts& facts, const DepthPlanesOptions& planes,
-                     std::size_t num_cameras) const;
-
- private:
   /// Points that a keyframe shares with the keyframe before it.
   struct Shared {
     std::uint32_t in_view = 0;  // points of that keyframe in the view of this one
@@ -90,6 +78,30 @@ class QualityStatistics {
     float too_far = 0;      // fraction beyond QualityFacts::sure_depth_m
     Shared before;
   };
+
+ public:
+  /// A keyframe that is judged, but not added.
+  struct Judged {
+    Keyframe keyframe;
+    PixelCounts pixels;
+    KeyframeDepthMap of;  // its depths, view and pose
+  };
+
+  /// Judges the next keyframe, and reserves the memory that `add` needs.
+  Judged judge(const KeyframeDepthMap& keyframe, const QualityFacts& facts);
+  void add(Judged judged) noexcept;
+  /// Returns the predicted fraction of right depths of a keyframe, from it and the keyframes before
+  /// and after it that were added. What is usual among all keyframes is up to a twentieth of the
+  /// keyframes older: otherwise the cost of each would grow with their number.
+  double rightShareOf(std::size_t keyframe);
+  std::size_t keyframes() const { return keyframes_.size(); }
+
+  /// Returns the quality of all keyframes. Cost: linear in their number.
+  /// @param planes of the map. @param num_cameras number of cameras that took part.
+  MapQuality quality(const QualityFacts& facts, const DepthPlanesOptions& planes,
+                     std::size_t num_cameras) const;
+
+ private:
   void findBadKeyframes(MapQuality& quality) const;
   double usualHits() const;
   double rightShareOf(std::size_t keyframe, double usual_hits) const;
@@ -98,6 +110,8 @@ class QualityStatistics {
   std::vector<Keyframe> keyframes_;
   PixelCounts pixels_;
   KeyframeDepthMap last_;  // its depths, view and pose
+  double usual_hits_ = 0;  // of the first `usual_of_` keyframes
+  std::size_t usual_of_ = 0;
 };
 
 }  // namespace efm

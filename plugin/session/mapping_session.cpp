@@ -320,13 +320,8 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
 void MappingSession::insert(KeyframeDepthMap& keyframe) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
   if (quality_.keyframes() > 0) leaveOutBad(quality_.keyframes() - 1);
-  QualityStatistics judged = quality_;
-  MapQuality quality;
-  if (options_.checks) {
-    judged.add(keyframe, facts_);
-    quality = judged.quality(facts_, options_.mapper.keyframe.planes,
-                             selectedCameras(store_.mapper.rig(), options_.mapper.cameras).size());
-  }
+  std::optional<QualityStatistics::Judged> judged;
+  if (options_.checks) judged = quality_.judge(keyframe, facts_);
   status_.silent_keyframes.resize(store_.mapper.rig().cameras.size());
   const std::size_t kept = map_.trajectory.size();
   const std::size_t kept_keyframes = map_.keyframes.size();
@@ -350,8 +345,7 @@ void MappingSession::insert(KeyframeDepthMap& keyframe) {
     map_.keyframes.resize(std::min(map_.keyframes.size(), kept_keyframes));
     throw;
   }
-  std::swap(quality_, judged);
-  std::swap(status_.quality, quality);
+  if (judged) quality_.add(std::move(*judged));
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
@@ -385,6 +379,7 @@ void MappingSession::forgetOldest() {
 /// Leaves the keyframes below `end` out of the map whose quality is too low. The quality of a
 /// keyframe is known when the next one is made.
 void MappingSession::leaveOutBad(std::size_t end) {
+  if (options_.min_keyframe_quality <= 0) return;
   for (; num_judged_ < end; ++num_judged_) {
     if (quality_.rightShareOf(num_judged_) >= options_.min_keyframe_quality) continue;
     cloud_.removePoints(num_judged_);
@@ -423,8 +418,23 @@ std::shared_ptr<MapSnapshot> MappingSession::snapshot(bool with_points) {
   return map;
 }
 
+/// Judges all keyframes so far. During a session it does so after each twentieth of the keyframes:
+/// otherwise the cost of a status would grow with their number.
+const MapQuality& MappingSession::mapQuality() const {
+  constexpr std::size_t kParts = 20;
+  const std::size_t judged = map_quality_.keyframes.size();
+  const std::size_t waiting = quality_.keyframes() - judged;
+  if (waiting > (finished_ ? 0 : judged / kParts)) {
+    map_quality_ =
+        quality_.quality(facts_, options_.mapper.keyframe.planes,
+                         selectedCameras(store_.mapper.rig(), options_.mapper.cameras).size());
+  }
+  return map_quality_;
+}
+
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
+  status.quality = mapQuality();
   status.held_events = store_.mapper.heldEvents();
   status.events = store_.events;
   status.counts = earlier_counts_;

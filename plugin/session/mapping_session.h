@@ -164,6 +164,7 @@ class MappingSession {
   void keep(StoredKeyframe keyframe);
   void forgetOldest();
   void leaveOutBad(std::size_t end);
+  const MapQuality& mapQuality() const;
   void moveKeyframes(double tolerance_m);
 
   AutomaticOptions automatic_;  // as the user gave them, without what stays as it is
@@ -179,6 +180,7 @@ class MappingSession {
   MapSnapshot map_;  // without points; the poses are refined by `snapshot`
   QualityFacts facts_;
   QualityStatistics quality_;
+  mutable MapQuality map_quality_;                       // see mapQuality()
   std::size_t num_judged_ = 0;                           // keyframes that are left out, or not
   std::set<std::size_t> left_out_;                       // keyframes without points in the cloud
   std::optional<std::variant<Jump, ClockReset>> break_;  // the input goes on behind it

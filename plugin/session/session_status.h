@@ -118,8 +118,9 @@ struct SessionStatus {
   bool scene_unknown = false;        ///< True if the last choice found no scene: it is a guess.
   /// Playback with automatic options: the poses do not explain the events of the first look.
   std::vector<Warning> pose_warnings;
-  std::vector<Warning> pose_notes;            ///< What the first look could not check.
-  MapQuality quality;                         ///< How good the map so far is.
+  std::vector<Warning> pose_notes;  ///< What the first look could not check.
+  /// How good the map so far is. Before the end, up to a twentieth of the keyframes older.
+  MapQuality quality;
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
   std::optional<LiveStatus> live{};           ///< In live operation (a session sets it always).
 };

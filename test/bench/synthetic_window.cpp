@@ -80,16 +80,28 @@ Trajectory trajectoryOver(const SyntheticWindowOptions& options) {
   }
 }
 
+/// Returns edges on surfaces: the view is divided into parts, and each has its own depth.
 std::vector<Edge> randomEdges(std::mt19937& random) {
+  constexpr double kSide = 0.9;  // of the view, at a distance of 1
+  constexpr double kAspect = 0.75;
+  constexpr int kColumns = 6;
+  constexpr int kRows = 4;
   std::uniform_real_distribution<double> depth_m(1, 6);
-  std::uniform_real_distribution<double> side(-0.9, 0.9);
-  std::normal_distribution<double> extent_m(0, 0.4);
+  std::uniform_real_distribution<double> side(-1, 1);
+  std::normal_distribution<double> extent(0, 0.13);  // relative to the distance
+  double surfaces_m[kRows][kColumns];
+  for (auto& row : surfaces_m) {
+    for (double& surface_m : row) surface_m = depth_m(random);
+  }
   std::vector<Edge> edges;
   for (int i = 0; i < kEdges; ++i) {
-    const double z = depth_m(random);
-    const Eigen::Vector3d from(side(random) * z, 0.75 * side(random) * z, z);
+    const double x = side(random);
+    const double y = side(random);
+    const double z = surfaces_m[static_cast<int>(0.5 * (y + 1) * kRows)]
+                               [static_cast<int>(0.5 * (x + 1) * kColumns)];
+    const Eigen::Vector3d from(kSide * x * z, kAspect * kSide * y * z, z);
     edges.push_back(
-        {from, from + Eigen::Vector3d(extent_m(random), extent_m(random), 0.3 * extent_m(random))});
+        {from, from + z * Eigen::Vector3d(extent(random), extent(random), 0.1 * extent(random))});
   }
   return edges;
 }

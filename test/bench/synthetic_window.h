@@ -44,9 +44,10 @@ struct SyntheticWindowOptions {
   bool strong_lens = false;
 };
 
-/// A window of events of a rig that looks at straight edges 1 to 6 m away. Every tenth event is
-/// noise. Events are computed from the edges without images: millions of events in less than a
-/// second, with positions and times like real events.
+/// A window of events of a rig that looks at straight edges 1 to 6 m away. The edges in a part of
+/// the view lie on one surface, as in a real scene. Every tenth event is noise. Events are computed
+/// from the edges without images: millions of events in less than a second, with positions and
+/// times like real events.
 struct SyntheticWindow {
   Rig rig;
   Trajectory trajectory;

@@ -200,7 +200,6 @@ void EventPackets::take(const Event& event) {
 void EventPackets::takeBlock() {
   constexpr std::uint64_t kBurst = 1000;
   constexpr std::size_t kMaxPlaces = 16;  // some formats find them slowly
-  events_.reserve(events_.size() + block_.size());
   block_begin_ = read_events_;
   for (std::size_t i = 0; i < block_.size() && damage_.empty(); ++i) {
     const Event& event = block_[i];

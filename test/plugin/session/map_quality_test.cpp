@@ -35,7 +35,7 @@ struct Wall {
       keyframe.map.probability = cv::Mat1f(48, 64, probability);
       keyframe.map.pixels = {1000, 0, at_farthest, 0};
       keyframe.parallax_px_m = parallax_px_m;
-      statistics.add(keyframe, facts);
+      statistics.add(statistics.judge(keyframe, facts));
     }
     return statistics.quality(facts, {}, num_cameras);
   }
