@@ -103,7 +103,7 @@ void FusionMapper::setAllCompleteUntil(std::int64_t t_ns) {
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageTimes* times) {
   failed_.reset();
   {
-    const StageScope scope(times, &StageSeconds::filter);
+    const StageScope scope(times, &StageSeconds::filter, Processors::kThis);
     filterEvents();
   }
   while (const std::optional<Window> window = completeWindow()) {

@@ -308,6 +308,14 @@ TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
   }
 }
 
+TEST(RefinedCloud, KeyframesWithoutPointsAreFinalizedSoThatTheirNumberStaysBounded) {
+  RefinedCloud cloud({}, 0);
+  for (int i = 0; i < 25'000; ++i) cloud.insert({}, {});
+  // The memory of 20,000 empty keyframes is that of 200,000 voxels.
+  const std::uint64_t kAllKeyframes = std::numeric_limits<std::uint64_t>::max();
+  EXPECT_LT(cloud.cloud().unfinalizedVoxels(kAllKeyframes), 100'000U);
+}
+
 TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARejectedMoveItIsAsBefore) {
   std::mt19937 random(4);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
