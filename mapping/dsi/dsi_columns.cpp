@@ -35,8 +35,10 @@ void RunningPeaks::add(int plane, const float* values) {
 }
 
 void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {
+  assert(static_cast<std::size_t>(tile.area()) == best_.size());
   efm::writeTo(images.confidence(tile), best_.data());
   if (images.plane.empty()) return;
+  assert(!previous_.empty());
   efm::writeTo(images.plane(tile), plane_.data());
   efm::writeTo(images.before(tile), before_.data());
   efm::writeTo(images.after(tile), after_.data());

@@ -63,7 +63,8 @@ class RunningPeaks {
 class TileVolume {
  public:
   TileVolume(int planes, std::size_t pixels)
-      : stride_(pixels + kernels::kSumPadding),
+      : stride_((pixels + 2 * kernels::kSumPadding - 1) / kernels::kSumPadding *
+                kernels::kSumPadding),
         values_(static_cast<std::size_t>(planes) * stride_) {}
 
   void setPlane(int plane, const PlaneValues& values);

@@ -116,11 +116,12 @@ struct PeakFunctions {
   Add addAlone = nullptr;
 };
 
-/// Vectors may read, and write back, this number of values past the end of a sum.
-inline constexpr std::size_t kSumPadding = 16;
-
 /// @param kernel one of `availableKernels`; all kernels give the same bits.
 const PeakFunctions& peakFunctions(VotingKernel kernel);
+
+/// Vectors may read, and write back, this number of values past the end of a fused plane
+/// (`ResolveFunctions` in tile_scatter.h).
+inline constexpr std::size_t kSumPadding = 16;
 
 /// Vectors may read and write this number of values past the end of each array.
 inline constexpr std::size_t kRankPadding = 16;

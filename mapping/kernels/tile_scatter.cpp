@@ -38,7 +38,7 @@ class LanesToFront {
  public:
   template <class Mask>
   explicit HWY_INLINE LanesToFront(Mask mask)
-#if HWY_TARGET == HWY_AVX3
+#if HWY_MAX_BYTES >= 64
       : mask_(mask) {
   }
   HWY_INLINE FloatV operator()(FloatV values) const { return hn::Compress(values, mask_); }

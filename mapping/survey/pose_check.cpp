@@ -280,7 +280,7 @@ class PoseCheck {
     double best_s =
         bestShift(shifts_s, [&](double s, double least) { return gainsOfShift(s, half(), least); });
     // A gain that is too small for a report is noise if the poses are clearly right.
-    if (is_clear &&
+    if (is_clear && best_s != 0 &&
         gainsOfShift(best_s, pieces_.size()).mean() < minGain(PoseMistake::kTimeShift)) {
       best_s = 0;
     }

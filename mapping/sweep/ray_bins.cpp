@@ -295,6 +295,7 @@ void RayBins::gather(const Footprint& footprint, const TileCells& tile,
                      const kernels::TileFunctions& functions, TileRays& rays) const {
   constexpr double kRounding_px = 0.01;
   constexpr std::uint32_t kRaysPerLine = 64 / sizeof(kernels::BinnedRay);
+  static_assert(kRaysPerLine > 0);
   constexpr std::uint32_t kPrefetchedRays = 64 * kRaysPerLine;
   const cv::Rect& cells = tile.in_view;
   const auto narrow = [](double value) { return static_cast<float>(value); };

@@ -185,8 +185,8 @@ class TilePeaks {
   /// Adds a plane. Planes are added in increasing order, without a gap; in any order with columns.
   void add(int plane) { peaks_->add(plane, this->plane(plane)); }
   void add(int plane, const PlaneValues& values) {
-    volume_.setPlane(columns_ ? plane : 0, values);
-    add(plane);
+    peaks_->add(plane, values.data());
+    if (columns_) volume_.setPlane(plane, values);
   }
   const RunningPeaks& peaks() const { return *peaks_; }
   /// Interpolates the planes that were not added. Needs columns. @param added one flag per plane.

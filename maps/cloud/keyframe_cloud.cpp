@@ -116,8 +116,8 @@ void RefinedCloud::finalize() {
   const std::uint64_t below = newest - movable_ - kCheckers;
   if (below < next_look_) return;
   if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) {
-    constexpr std::uint64_t kParts = 20;  // the cost of a look grows with the keyframes
-    next_look_ = below + (below - finalized_below_) / kParts + 1;
+    // The cost of a look grows with the keyframes.
+    next_look_ = below + std::min<std::uint64_t>((below - finalized_below_) / 20, 20) + 1;
     return;
   }
   finalized_below_ = below;

@@ -47,7 +47,7 @@ Velocity meanOf(const Velocity& a, const Velocity& b) {
   return {(a.linear + b.linear) / 2, (a.angular + b.angular) / 2};
 }
 
-/// Compares times. Trackers may have 100,000 poses a second, so they are searched by halves.
+/// Compares times, for a binary search: trackers may have 100,000 poses a second.
 struct IsBefore {
   bool operator()(std::int64_t t_ns, const StampedPose& pose) const { return t_ns < pose.t_ns; }
   bool operator()(const StampedPose& pose, std::int64_t t_ns) const { return pose.t_ns < t_ns; }

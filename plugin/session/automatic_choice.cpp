@@ -169,6 +169,7 @@ void MappingSession::use(NewOptions given) {
   status_.pose_warnings = std::move(verdict.warnings);
   status_.pose_notes = std::move(verdict.notes);
   facts_ = std::move(verdict.quality);
+  map_quality_ = {};
   use(std::move(given.chosen.choice), given.chosen.mapper);
   if (!given.follow_depths) depth_follower_.reset();
 }

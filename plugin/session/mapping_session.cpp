@@ -294,7 +294,10 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
   if (!hasCameras() || !chooseAutomatic()) return std::nullopt;
   std::optional<KeyframeDepthMap> keyframe = store_.mapper.next(sink, &status_.times);
   while (!keyframe && endPiece()) keyframe = store_.mapper.next(sink, &status_.times);
-  if (!keyframe && finished_) leaveOutBad(quality_.keyframes());
+  if (!keyframe && finished_) {
+    leaveOutBad(quality_.keyframes());
+    map_quality_ = {};  // to be judged once more, of all keyframes
+  }
   if (keyframe) {
     try {
       if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
@@ -418,13 +421,13 @@ std::shared_ptr<MapSnapshot> MappingSession::snapshot(bool with_points) {
   return map;
 }
 
-/// Judges all keyframes so far. During a session it does so after each twentieth of the keyframes:
-/// otherwise the cost of a status would grow with their number.
+/// Judges the keyframes again after each twentieth of them: otherwise the cost of a status would
+/// grow with their number.
 const MapQuality& MappingSession::mapQuality() const {
   constexpr std::size_t kParts = 20;
   const std::size_t judged = map_quality_.keyframes.size();
   const std::size_t waiting = quality_.keyframes() - judged;
-  if (waiting > (finished_ ? 0 : judged / kParts)) {
+  if (waiting > judged / kParts) {
     map_quality_ =
         quality_.quality(facts_, options_.mapper.keyframe.planes,
                          selectedCameras(store_.mapper.rig(), options_.mapper.cameras).size());

@@ -119,7 +119,7 @@ struct SessionStatus {
   /// Playback with automatic options: the poses do not explain the events of the first look.
   std::vector<Warning> pose_warnings;
   std::vector<Warning> pose_notes;  ///< What the first look could not check.
-  /// How good the map so far is. Before the end, up to a twentieth of the keyframes older.
+  /// How good the map so far is. Until the last keyframe it may lack up to a twentieth of them.
   MapQuality quality;
   std::optional<RefinementState> refinement;  ///< Set if poses are refined.
   std::optional<LiveStatus> live{};           ///< In live operation (a session sets it always).
