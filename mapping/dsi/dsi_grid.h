@@ -46,7 +46,7 @@ const std::vector<VotingKernel>& availableKernels();
 bool isAvailable(VotingKernel kernel);
 
 /// Returns the fastest of some kernels, or plain. Measured speeds, as multiples of plain's:
-/// baseline 0.6 to 1, SSE4 2 to 2.2, AVX2 2.2 to 2.6, AVX-512 3.2 to 4.6 (docs/performance.md).
+/// baseline 0.6 to 1, SSE4 2 to 2.2, AVX2 2.5 to 4.2, AVX-512 2.6 to 4.5 (docs/performance.md).
 /// NEON has not been measured: its vectors are as long as SSE4's, and the code is the same.
 VotingKernel fastestOf(const std::vector<VotingKernel>& kernels);
 /// Returns the fastest of `availableKernels`.
