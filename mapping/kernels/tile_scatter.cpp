@@ -105,7 +105,8 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
     const auto along = hn::And(hn::Ge(hn::Max(y0, y1), set(request.top)),
                                hn::Lt(hn::Min(y0, y1), set(request.bottom)));
     const auto near = hn::And(hn::And(across, along), hn::FirstN(d, count - i));
-    if (hn::AllFalse(d, near)) continue;
+    // Long vectors have a ray near nearly always, and their compression costs less than a branch.
+    if (hn::MaxLanes(d) <= 8 && hn::AllFalse(d, near)) continue;
     // Whole vectors are stored, also into the padding: compressing directly into memory is slower.
     const LanesToFront to_front(near);
     const auto append = [&](FloatV values, float* to) {

@@ -8,7 +8,7 @@ namespace {
 
 /// The cost of gathering a ray for a group of planes, in votes. It includes the rays around the
 /// tile that are tested but not used.
-constexpr double kGatheringVotes = 5;
+constexpr double kGatheringVotes = 2.5;
 
 /// Returns the number of votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
