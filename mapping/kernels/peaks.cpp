@@ -24,7 +24,7 @@ HWY_INLINE void storeWhere(D d, M where, hn::Vec<D> value, hn::TFromD<D>* to) {
 }
 
 /// Adds pixels [i, n) in whole vectors of the tag's lanes. @return the first pixel that is left.
-template <class D>
+template <bool kNeighbours, class D>
 HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
                              std::int32_t plane, const float* values) {
   const hn::RebindToSigned<D> d_plane;
@@ -33,46 +33,30 @@ HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays
   const auto last_plane = hn::Set(d_plane, plane - 1);
   for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
     const auto value = hn::LoadU(d, values + i);
-    const auto previous = hn::LoadU(d, peaks.previous + i);
     const auto better = hn::Gt(value, hn::LoadU(d, peaks.best + i));
-    const auto follows = hn::RebindMask(d, hn::Eq(hn::LoadU(d_plane, peaks.plane + i), last_plane));
     // No branch skips unchanged vectors: noise makes it unpredictable, and that costs more.
     storeWhere(d, better, value, peaks.best + i);
+    if constexpr (kNeighbours) {
+      const auto previous = hn::LoadU(d, peaks.previous + i);
+      const auto follows =
+          hn::RebindMask(d, hn::Eq(hn::LoadU(d_plane, peaks.plane + i), last_plane));
+      storeWhere(d, better, previous, peaks.before + i);
+      storeWhere(d, hn::Or(better, follows), hn::IfThenElse(better, none, value), peaks.after + i);
+      hn::StoreU(value, d, peaks.previous + i);
+    }
     storeWhere(d_plane, hn::RebindMask(d_plane, better), this_plane, peaks.plane + i);
-    storeWhere(d, better, previous, peaks.before + i);
-    storeWhere(d, hn::Or(better, follows), hn::IfThenElse(better, none, value), peaks.after + i);
-    hn::StoreU(value, d, peaks.previous + i);
   }
   return i;
 }
 
-/// As `addBy`, without the neighbours.
-template <class D>
-HWY_INLINE std::size_t addAloneBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
-                                  std::int32_t plane, const float* values) {
-  const hn::RebindToSigned<D> d_plane;
-  const auto this_plane = hn::Set(d_plane, plane);
-  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
-    const auto value = hn::LoadU(d, values + i);
-    const auto best = hn::LoadU(d, peaks.best + i);
-    hn::StoreU(hn::Max(value, best), d, peaks.best + i);
-    storeWhere(d_plane, hn::RebindMask(d_plane, hn::Gt(value, best)), this_plane, peaks.plane + i);
-  }
-  return i;
-}
-
-// Full vectors are added first, then the rest in vectors of one lane.
+// Adds full vectors first, then the rest in vectors of one lane.
+template <bool kNeighbours>
 void add(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
-  const std::size_t done = addBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
-  addBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
+  const std::size_t done = addBy<kNeighbours>(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
+  addBy<kNeighbours>(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
 }
 
-void addAlone(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
-  const std::size_t done = addAloneBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
-  addAloneBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
-}
-
-constexpr PeakFunctions kPeaks = {add, addAlone};
+constexpr PeakFunctions kPeaks = {add<true>, add<false>};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

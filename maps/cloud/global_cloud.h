@@ -100,6 +100,7 @@ class GlobalCloud {
   /// will be: from now on `insert` rejects them, and `remove` and `replace` reject the keyframes
   /// below `below`. Keyframes from `below` on may change, but their verdicts on merged points stay.
   void finalize(std::uint64_t below);
+  std::uint64_t finalizedBelow() const { return finalized_below_; }
   /// The numbers of voxels that `finalize` has merged, and that it would merge; the latter and 10
   /// for each keyframe, by its memory.
   std::size_t finalizedVoxels() const { return finalized_.size(); }

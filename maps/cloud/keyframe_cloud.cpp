@@ -117,10 +117,9 @@ void RefinedCloud::finalize() {
   if (below < next_look_) return;
   if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) {
     // The cost of a look grows with the keyframes.
-    next_look_ = below + std::min<std::uint64_t>((below - finalized_below_) / 20, 20) + 1;
+    next_look_ = below + std::min<std::uint64_t>((below - cloud_.finalizedBelow()) / 20, 20) + 1;
     return;
   }
-  finalized_below_ = below;
   const std::uint64_t first_movable = below + kCheckers;
   if (movable_ > 0 && first_movable > fixed_) freeze(first_movable - fixed_);
   cloud_.finalize(below);

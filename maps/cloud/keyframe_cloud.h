@@ -87,9 +87,9 @@ class RefinedCloud {
 
   GlobalCloud cloud_;
   std::size_t movable_;
-  std::size_t fixed_ = 0;   // keyframes of an earlier map
-  std::size_t frozen_ = 0;  // the first keyframes, which cannot move any more
-  std::uint64_t finalized_below_ = 0, next_look_ = 0;  // see finalize()
+  std::size_t fixed_ = 0;        // keyframes of an earlier map
+  std::size_t frozen_ = 0;       // the first keyframes, which cannot move any more
+  std::uint64_t next_look_ = 0;  // see finalize()
   std::vector<Rigid3> T_world_ref_;
   std::vector<KeptPoints> kept_;           // one per T_world_ref_ if keyframes move; frozen: none
   std::map<std::size_t, Rigid3> pending_;  // requested poses
