@@ -416,6 +416,9 @@ void defineMapper(py::module_& module) {
       .def(
           "points",
           [](const Mapper& mapper) { return pointsOf(*released([&] { return mapper.points(); })); })
+      .def(
+          "hash", [](const Mapper& mapper) { return mapHash(*mapper.points()); },
+          py::call_guard<Released>())
       .def("trajectory",
            [](const Mapper& mapper) {
              return posesOf(released([&] { return mapper.trajectory(); }));

@@ -18,6 +18,7 @@
 #include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/recording_info.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 namespace {
@@ -34,12 +35,14 @@ MapJob jobOf(const RecordingSource& source, const Options& options, const OnKeyf
 }
 
 MapResult mapRecordingInto(const RecordingSource& source, const Options& options,
-                           const std::filesystem::path& out, bool force,
+                           const std::filesystem::path& out, bool force, bool resume,
                            const std::shared_ptr<StopFlag>& stop, const OnKeyframe& on_keyframe,
                            const OnProgress& on_progress) {
   MapJob job = jobOf(source, options, on_keyframe, on_progress);
   job.out = out;
   job.force = force;
+  job.resume = resume;
+  job.needs_map = true;
   job.stop = [stop] { return stop->load(); };
   return mapInto(std::move(job));
 }
@@ -155,6 +158,16 @@ std::string infoOf(const RecordingSource& source) {
 
 using Path = std::filesystem::path;
 
+/// Returns times and T_world_ref of the keyframes. @param refined false: by the tracker.
+py::object storedPoses(const SessionFile& file, bool refined) {
+  std::vector<StampedPose> poses;
+  {
+    const Released released;
+    poses = file.poses(refined);
+  }
+  return posesOf(poses);
+}
+
 std::string depthErrorJson(const Path& estimate, const Path& truth, int tolerance_px,
                            std::optional<double> max_depth_m, std::optional<double> png_scale,
                            const Path& mask, const std::vector<double>& thresholds_m,
@@ -217,15 +230,35 @@ void defineJobs(py::module_& module) {
       .def("set", [](StopFlag& flag) { flag = true; });
   py::class_<MapResult>(module, "MapResult")
       .def_property_readonly("points", [](const MapResult& r) { return pointsOf(*r.map->points); })
+      .def(
+          "hash", [](const MapResult& r) { return mapHash(*r.map->points); }, releases)
       .def_property_readonly("trajectory",
                              [](const MapResult& r) { return posesOf(r.map->trajectory); })
       .def_property_readonly("tracker_trajectory",
                              [](const MapResult& r) { return posesOf(r.map->tracker_trajectory); })
-      .def_property_readonly("report", [](const MapResult& r) { return reportJson(r.report); })
+      .def_property_readonly("report",
+                             [](const MapResult& r) {
+                               return r.complete_before.empty() ? reportJson(r.report)
+                                                                : r.complete_before;
+                             })
       .def(
           "save", [](const MapResult& r, const Path& file) { savePoints(*r.map, file); }, releases)
       .def("reject_error", &MapResult::rejectError);
   module.def("run_map", &mapRecordingInto, releases);
+  py::class_<SessionFile>(module, "SessionFile")
+      .def(py::init<const Path&>(), releases)
+      .def_property_readonly("keyframes", &SessionFile::keyframes)
+      .def(
+          "keyframe",
+          [](const SessionFile& f, std::size_t i) {
+            return std::make_shared<Keyframe>(f.keyframe(i));
+          },
+          releases)
+      .def("poses", &storedPoses)
+      .def_property_readonly(
+          "run", [](const SessionFile& f) { return f.run().is_null() ? "{}" : f.run().dump(); })
+      .def_property_readonly("report", &SessionFile::report)
+      .def_property_readonly("damage", &SessionFile::damage);
   module.def("run_dsi", &mapDsi);
   PYBIND11_NUMPY_DTYPE_EX(PixelEvidence<CandidateInputs>, x, "x", y, "y", depth_m, "depth", sigma_m,
                           "sigma", probability, "probability", inputs, "inputs");

@@ -199,10 +199,17 @@ class Mapper {
   std::shared_ptr<MapperDriver> driver_;  ///< Not for hosts: its class is not installed.
 };
 
+/// Returns the SHA-256 of a map's points in hexadecimal digits: rows of x, y, z (metres, frame
+/// `world`), intensity, sigma, probability (-1: not known) and support as little-endian doubles,
+/// sorted. The same recording and options have the same hash, on any number of threads and any
+/// host.
+std::string mapHash(const MapCloud& cloud);
+
 /// What `mapRecording` made.
 struct Report {
   std::uint64_t keyframes = 0;
   std::uint64_t points = 0;
+  std::string map_hash;  ///< `mapHash` of the exported points.
   std::vector<Warning> warnings;
   MapQuality quality;
   std::string json;  ///< The content of report.json: counts, times, options, …
@@ -212,12 +219,15 @@ struct Report {
 /// data are chosen from the whole recording first. The folder gets map.pcd, map.html, keyframes/,
 /// trajectory.txt, report.json and pictures; an earlier result there is replaced.
 /// @param files, overrides see `openRecording`.
+/// @param resume goes on with the keyframes that a run for this folder stored before it was stopped
+/// or killed: the result is that of one undisturbed run. A complete result is not changed.
 /// @throws std::invalid_argument if an option is out of range; std::runtime_error if the recording
-/// cannot be read to its end, has no keyframe, or a file cannot be written. The data before the
-/// damage are mapped and written all the same.
+/// cannot be read to its end, has no keyframe, or a file cannot be written; with `resume`, if
+/// options or recording differ from those of the stored keyframes. The data before the damage are
+/// mapped and written all the same.
 Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options = {},
-                    const Overrides& overrides = {});
+                    const Overrides& overrides = {}, bool resume = false);
 
 /// Writes a binary PCD file with the fields of MapPoint. The file appears when it is complete.
 /// @throws std::runtime_error naming the file.

@@ -13,6 +13,7 @@
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/trajectory.h"
+#include "mapping/motion/motion_correction.h"
 
 namespace efm {
 
@@ -42,7 +43,8 @@ cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView
 /// The depth map of one window of events.
 struct KeyframeDepthMap {
   Window window;
-  Rigid3 T_world_ref;  ///< Pose of the reference view.
+  Rigid3 T_world_ref;  ///< Pose of the reference view; a map builder refines it by option.
+  Rigid3 T_odom_ref;   ///< The same by the tracker.
   Rigid3 T_rig_ref;    ///< The same, on the rig.
   ReferenceView view;
   DepthPlanesOptions planes;  ///< The keyframe was made with them.
@@ -54,7 +56,11 @@ struct KeyframeDepthMap {
   std::optional<MotionCorrection> motion_correction;
   /// By how much the poses blur the events, pixels; std::nullopt: not looked at, or not known.
   std::optional<double> blur_px;
-  double sharpness_gain = 1;  ///< By the correction.
+  double sharpness_gain = 1;            ///< By the correction.
+  BlurWatch blur_watch;                 ///< After this window.
+  std::optional<PoseNoise> pose_noise;  ///< What the tracker states for the pose.
+  /// It was made after the run was stopped: the rest of the input may make another one.
+  bool after_stop = false;
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;

@@ -135,6 +135,15 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
                                                     const std::vector<EventSpan>& events,
                                                     const Trajectory& trajectory, DsiSink* sink,
                                                     StageTimes* times) {
+  if (keyframes_ % kBlockKeyframes == 0) blur_ = {};
+  if (options_.made_earlier) {
+    if (std::optional<KeyframeDepthMap> earlier = options_.made_earlier(window)) {
+      ++keyframes_;
+      blur_ = earlier->blur_watch;
+      sequence_maximum_.add(earlier->max_confidence);
+      return earlier;
+    }
+  }
   // 1. Input: events, trajectory, calibration.
   const std::vector<CameraEvents> all = selectedEvents(events);
   std::vector<CameraEvents> cameras = all;
@@ -154,6 +163,9 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   KeyframeDepthMap keyframe =
       arena.execute([&] { return mapBest(input, trajectory, sink, times); });
 
+  ++keyframes_;
+  keyframe.blur_watch = blur_;
+  keyframe.T_odom_ref = keyframe.T_world_ref;
   keyframe.T_rig_ref = referencePose({});
   keyframe.over_budget = over_budget;
   sequence_maximum_.add(keyframe.max_confidence);
@@ -257,9 +269,9 @@ KeyframeDepthMap KeyframeMapper::mapSharpest(const WindowInput& input, const Tra
   }
   const double gain = sharpness > 0 ? sharpnessOf(sharpest) / sharpness : 1;
   if (sink != nullptr) {
-    std::optional<MotionCorrection> correction = std::move(sharpest.motion_correction);
-    sharpest = mapAlong(input, motion, sink, times);
-    sharpest.motion_correction = std::move(correction);
+    KeyframeDepthMap again = mapAlong(input, motion, sink, times);
+    again.motion_correction = std::move(sharpest.motion_correction);
+    sharpest = std::move(again);
   }
   sharpest.blur_px = blur_px;
   sharpest.sharpness_gain = gain;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -54,6 +55,9 @@ struct KeyframeMapperOptions {
   /// The value of `WhiteLevel::kSequence`, if an earlier pass over the recording found it. If it is
   /// not given, the robust maximum of the keyframes so far is used.
   std::optional<double> sequence_maximum;
+  /// Returns the keyframe that an earlier run made of the same data in a window; its pose is the
+  /// tracker's. std::nullopt: none, the window is mapped. May be empty.
+  std::function<std::optional<KeyframeDepthMap>(const Window&)> made_earlier;
   bool camera_maps = false;   ///< True: also a depth map of each camera alone, in the same view.
   bool event_images = false;  ///< True: also each camera's events as an image.
   bool view_events = false;   ///< True: also the reference camera's events in the view.
@@ -66,6 +70,10 @@ struct KeyframeMapperOptions {
 /// one window to the next it keeps only the running maximum of confidences, and the blur by poses.
 class KeyframeMapper {
  public:
+  /// The blur by poses is forgotten after each 64th keyframe: a keyframe depends on the windows of
+  /// at most 63 keyframes before it.
+  static constexpr std::uint64_t kBlockKeyframes = 64;
+
   /// @param selected indices of the rig's cameras whose events take part.
   KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options);
 
@@ -114,6 +122,7 @@ class KeyframeMapper {
   std::vector<UndistortionTable> undistortion_;  // per selected camera
   RobustMaximum sequence_maximum_;
   BlurWatch blur_;
+  std::uint64_t keyframes_ = 0;
 };
 
 /// The motion of the selected cameras relative to the reference view within a window: maxima.

@@ -23,21 +23,21 @@ constexpr double kBlurPx = 0.4;
 }  // namespace
 
 bool BlurWatch::isOn() const {
-  std::vector<double> sorted = last_px_;
+  std::vector<double> sorted = last_px;
   std::sort(sorted.begin(), sorted.end());
   return !sorted.empty() && sorted[sorted.size() / 2] >= kBlurPx;
 }
 
 bool BlurWatch::isDue() const {
-  return last_px_.empty() || last_px_.front() >= kBlurPx || since_look_ + 1 >= kLookEvery;
+  return last_px.empty() || last_px.front() >= kBlurPx || since_look + 1 >= kLookEvery;
 }
 
 void BlurWatch::add(std::optional<double> blur_px, double finest_px) {
-  ++since_look_;
+  ++since_look;
   if (!blur_px) return;
-  since_look_ = 0;
-  last_px_.insert(last_px_.begin(), *blur_px / finest_px);
-  if (last_px_.size() > kWatched) last_px_.pop_back();
+  since_look = 0;
+  last_px.insert(last_px.begin(), *blur_px / finest_px);
+  if (last_px.size() > kWatched) last_px.pop_back();
 }
 
 MotionCorrection knotsOf(const Window& window, double spacing_s) {

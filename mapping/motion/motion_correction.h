@@ -72,8 +72,7 @@ Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& windo
 
 /// Decides from the blur of some windows whether the poses blur them: by the median of the last
 /// three. It looks at the first window and then at each eighth, and at the next one after a blur.
-class BlurWatch {
- public:
+struct BlurWatch {
   /// Returns whether the poses blur the windows.
   bool isOn() const;
   /// Returns whether the next window is to be looked at.
@@ -84,11 +83,10 @@ class BlurWatch {
   /// @param finest_px see AlignedMotion: a blur is judged in these pixels.
   void add(std::optional<double> blur_px, double finest_px = 1);
   /// Replaces the blur of the last window that was looked at by a better value.
-  void setLast(double blur_px, double finest_px = 1) { last_px_.front() = blur_px / finest_px; }
+  void setLast(double blur_px, double finest_px = 1) { last_px.front() = blur_px / finest_px; }
 
- private:
-  std::vector<double> last_px_;  // of the finest edges; the newest first
-  int since_look_ = 0;           // windows
+  std::vector<double> last_px;  ///< Of the finest edges; the newest first.
+  int since_look = 0;           ///< Number of windows.
 };
 
 /// The part of a window around its reference time, with its events.

@@ -318,6 +318,9 @@ void addMap(CLI::App& app, Run& run) {
   auto arguments = argumentsOf(command, run, runMap);
   addMappingArguments(command, *arguments);
   addTimeLimits(command, arguments->times);
+  command.add_flag("--resume", arguments->resume,
+                   "Go on with the keyframes of a run that was stopped or killed, with the same "
+                   "arguments: the result is that of one run. A complete result is not changed");
   command.add_flag(
       "--view", arguments->view,
       "Show the growing map in a window; the mouse turns, moves and zooms it. Closing it "

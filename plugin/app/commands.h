@@ -96,6 +96,7 @@ struct MappingArguments {
 struct MapArguments : MappingArguments {
   bool view = false;                    ///< Show the growing map in a window.
   std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
+  bool resume = false;                  ///< Go on with the keyframes of an earlier run.
 };
 
 struct DepthArguments : MappingArguments {

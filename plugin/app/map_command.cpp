@@ -108,6 +108,7 @@ int CommandLineJob::run() {
     if (const auto wrong = reader.wrongOption(error)) throw UsageError(*wrong);
     throw;
   }
+  if (!result.complete_before.empty()) return 0;  // a note has said so
   const RunReport& report = result.report;
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (report.counts.keyframes > 0 && !quiet && !result.kept_earlier) {
@@ -174,6 +175,7 @@ int runMap(const MapArguments& arguments) {
   TimeLimits& limits = job.options.mapper.limits;
   limits = RecordingTimes(job.sourceNow()).resolve(arguments.times);
   asUsage([&] { limits.validate(); });
+  job.resume = arguments.resume;
   Watchers watchers(arguments, job);
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe, const RecordingKeyframes& run) {
     watchers.add(run, keyframe);

@@ -26,6 +26,7 @@ constexpr OptionWords kOptions[] = {
     {"truth-time-unit", {"truth_time_unit", "truth_time_unit=", "addPose", "time_unit="}},
     {"time-unit", {"Overrides::time_unit=", "time_unit=", "addEvents", "time_unit="}},
     {"event-columns", {"Overrides::event_columns=", "event_columns=", "addEvents", "add_events"}},
+    {"resume", {"resume", "resume=True", "resume", "resume"}},
     {"topics", {"Overrides::topics=", "topics=", "topics", "topics"}},
     {"format", {"Overrides::format=", "format=", "format", "format"}},
     {"skip-bad-events",

@@ -118,6 +118,7 @@ bool LiveMapper::takeAndMap() {
   publishState();
   publishMap(ends);
   if (!ends) return true;
+  attempt(Fault::kMapping, "the session file", [&] { endStored(); });
   warnOfLosses();
   tellOfEnd(sayer());
   endRun(error);
@@ -153,6 +154,7 @@ bool LiveMapper::mapNext() {
   }
   std::vector<std::string> warnings;
   map_changed_ = true;
+  attempt(Fault::kMapping, "the session file", [&] { store(*keyframe); });
   attempt(Fault::kMapping, "a warning", [&] { warnings = warningsOfSilence(*keyframe); });
   publishMap(false);
   publishState();

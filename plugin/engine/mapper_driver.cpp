@@ -11,6 +11,7 @@
 #include "plugin/engine/host_text.h"
 #include "plugin/engine/live_mapper.h"
 #include "plugin/engine/playback_mapper.h"
+#include "plugin/session_file/run_record.h"
 
 namespace efm {
 namespace {
@@ -27,6 +28,14 @@ std::optional<Warning> noKeyframe(const SessionStatus& state, const FusionMapper
   if (state.counts.keyframes > 0) return std::nullopt;
   return Warning{"no-keyframe",
                  fmt::format("there is no keyframe: {}", whyNoKeyframe(state, options).what())};
+}
+
+/// Gives the file of an earlier session another name: NAME.1, NAME.2, …
+void keepEarlier(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return;
+  int number = 1;
+  while (std::filesystem::exists(fmt::format("{}.{}", file.string(), number))) ++number;
+  std::filesystem::rename(file, fmt::format("{}.{}", file.string(), number));
 }
 
 }  // namespace
@@ -61,7 +70,21 @@ MapperDriver::MapperDriver(const EventFusionOptions& options, Callbacks callback
       callbacks_(std::move(callbacks)),
       setup_(readRigSetup(options.rig.calibration, options.rig.hand_eye)),
       session_(options, earlier, std::move(facts), choice_by),
-      statistics_(statisticsOptions(options)) {}
+      earlier_(earlier.size()),
+      statistics_(statisticsOptions(options)) {
+  if (!options.session || options.session_file.empty()) return;
+  const std::filesystem::path folder =
+      std::filesystem::absolute(options.session_file).parent_path();
+  if (!std::filesystem::is_directory(folder)) {
+    throw std::runtime_error(fmt::format("[output] session_file {}: there is no folder {}",
+                                         options.session_file.string(), folder.string()));
+  }
+  if (std::filesystem::exists(options.session_file) &&
+      !std::filesystem::is_regular_file(options.session_file)) {
+    throw std::runtime_error(fmt::format("[output] session_file {}: expected the name of a file",
+                                         options.session_file.string()));
+  }
+}
 
 // --- Input ---
 
@@ -156,6 +179,52 @@ std::optional<KeyframeDepthMap> MapperDriver::mapWindow() {
   pixel_sizes_.add(depthsIn(keyframe->map.depth), keyframe->view.fx);
   newest_planes_ = keyframe->planes;
   return keyframe;
+}
+
+// --- The session file ---
+
+template <typename Write>
+void MapperDriver::writeStored(const Write& write) {
+  if (!options_.session || options_.session_file.empty() || store_failed_) return;
+  try {
+    write();
+  } catch (...) {
+    store_failed_ = true;
+    stored_.reset();
+    throw;
+  }
+}
+
+void MapperDriver::store(const KeyframeDepthMap& keyframe) {
+  writeStored([&] {
+    if (!stored_) {
+      nlohmann::ordered_json run = runOf(options_);
+      const SessionStatus status = session_.status();
+      addChosen(run, status.rig, session_.options(), status.chosen);
+      keepEarlier(options_.session_file);
+      stored_ = std::make_unique<SessionWriter>(options_.session_file, run);
+    }
+    stored_->add(keyframe);
+  });
+}
+
+void MapperDriver::endStored() {
+  writeStored([&] {
+    if (!stored_) return;
+    const auto map = session_.snapshot(true);
+    const SessionStatus status = session_.status();
+    if (status.refinement) {
+      const auto first = map->trajectory.begin() + static_cast<std::ptrdiff_t>(earlier_);
+      stored_->addPoses({first, map->trajectory.end()});
+    }
+    stored_->finish(nlohmann::ordered_json{{"version", EFM_VERSION},
+                                           {"keyframes", status.counts.keyframes},
+                                           {"points", map->points->size()},
+                                           {"map_hash", mapHash(*map->points)},
+                                           {"quality", textOf(status.quality)}}
+                        .dump(2));
+    stored_.reset();
+  });
 }
 
 // --- Results ---

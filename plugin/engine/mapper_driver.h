@@ -17,6 +17,7 @@
 #include "plugin/checks/recording_statistics.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/session/mapping_session.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 
@@ -94,6 +95,11 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   void feed(Input input);
   /// Maps the next window. After an exception the map so far is as before.
   std::optional<KeyframeDepthMap> mapWindow();
+  /// Adds a keyframe to the session file, if the options name one. After an error it has no more.
+  /// @throws std::runtime_error once, naming the file.
+  void store(const KeyframeDepthMap& keyframe);
+  /// Ends the session file. @throws as `store`.
+  void endStored();
   /// Returns at most one warning per camera. The status counts the keyframes without its events.
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
 
@@ -115,6 +121,7 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
   const Callbacks callbacks_;
   const RigSetup setup_;
   MappingSession session_;
+  const std::size_t earlier_;         // number of keyframes of the initial map
   mutable std::mutex cameras_mutex_;  // guards given_rig_ and rig_is_fixed_
   Rig given_rig_;                     // as the host gave it
   bool rig_is_fixed_ = false;         // the session knows the cameras
@@ -124,6 +131,11 @@ class MapperDriver : public std::enable_shared_from_this<MapperDriver> {
  private:
   void fixRig(const Rig& given);
 
+  template <typename Write>
+  void writeStored(const Write& write);
+
+  std::unique_ptr<SessionWriter> stored_;
+  bool store_failed_ = false;
   std::set<int> silent_cameras_;  // cameras without events that were logged
   std::uint64_t told_news_ = 0, told_choices_ = 0;
   bool blur_told_ = false;

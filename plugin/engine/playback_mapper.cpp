@@ -129,6 +129,10 @@ void PlaybackMapper::finish() {
   work(std::move(rest), true);
   if (ended_.exchange(true)) return;
   FirstError error;
+  error.attempt([&] {
+    const std::lock_guard<TurnMutex> lock(session_mutex_);
+    endStored();
+  });
   tellOfEnd(sayer(error));
   error.rethrow();
 }
@@ -230,6 +234,7 @@ std::optional<KeyframeDepthMap> PlaybackMapper::mapNext(FirstError& error) {
       chooseIfDue();
       keyframe = mapWindow();
     });
+    if (keyframe) error.attempt([&] { store(*keyframe); });
     if (keyframe) error.attempt([&] { warnings = warningsOfSilence(*keyframe); });
     error.attempt([&] { news = takeNews(); });
   }

@@ -2,6 +2,7 @@
 #include "plugin/options/option_keys.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -201,6 +202,18 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
          chosen && *chosen ? OptionValue(std::string("auto")) : valueOf(field, allowed.unit)});
   });
   return list;
+}
+
+nlohmann::ordered_json asJson(const EventFusionOptions& options) {
+  auto json = nlohmann::ordered_json::object();
+  for (const NamedOption& option : listOptions(options)) {
+    std::visit(
+        [&](const auto& value) {
+          json[std::string(option.section)][std::string(option.key)] = value;
+        },
+        option.value);
+  }
+  return json;
 }
 
 bool isOptionSection(std::string_view section) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -94,6 +96,8 @@ void visitOptions(Options& options, const Use& use) {
   visit("camera_maps", keyframe.camera_maps);
   visit("event_images", keyframe.event_images);
   visit("ply", options.ply);
+  visit("session", options.session);
+  visit("session_file", options.session_file);
 
   visit.section = "performance";
   visit(keyframe.sweep);
@@ -114,6 +118,8 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options);
 /// @throws std::invalid_argument saying what is expected: "must be a number, or auto".
 bool setOption(EventFusionOptions& options, std::string_view section, std::string_view key,
                std::string_view text, const std::filesystem::path& folder);
+/// Returns all options: an object of sections, which are objects of keys.
+nlohmann::ordered_json asJson(const EventFusionOptions& options);
 /// Returns whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 

@@ -2,6 +2,7 @@
 #include "plugin/options/tracker_fault_keys.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <cstdint>
 #include <optional>
@@ -105,6 +106,14 @@ std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const Tracker
     if (const auto value = valueOfFault(allowed, field)) list.emplace_back(key, *value);
   });
   return list;
+}
+
+nlohmann::ordered_json asJson(const TrackerFaults& faults) {
+  auto json = nlohmann::ordered_json::object();
+  for (const auto& named : listTrackerFaults(faults)) {
+    std::visit([&](const auto& value) { json[named.first] = value; }, named.second);
+  }
+  return json;
 }
 
 std::string knownTrackerFaults() { return fmt::format("{}", fmt::join(faultKeys(), ", ")); }

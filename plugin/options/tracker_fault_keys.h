@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,8 @@ void setTrackerFault(std::string_view assignment, TrackerFaults& faults);
 /// Returns all keys with their values, without keys that have no value. Reading a value back gives
 /// the same value, except for the rounding of degrees.
 std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const TrackerFaults& faults);
+/// Returns the same as an object.
+nlohmann::ordered_json asJson(const TrackerFaults& faults);
 
 /// Returns all keys: "noise_m, noise_deg, ...".
 std::string knownTrackerFaults();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -14,12 +15,14 @@
 #include "plugin/engine/first_look.h"
 #include "plugin/engine/host_text.h"
 #include "plugin/playback/output_checks.h"
+#include "plugin/playback/stored_run.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/map_picture.h"
 #include "plugin/results/pictures/picture.h"
 #include "plugin/results/viewer/map_page.h"
+#include "plugin/session_file/run_record.h"
 
 namespace efm {
 
@@ -97,6 +100,9 @@ struct Job : MapJob {
 
   RunReport report;
   std::optional<UserError> write_error;  // the first one
+  nlohmann::ordered_json run;            // what the session file says of it
+  std::optional<StoredRun> stored;
+  std::unique_ptr<SessionWriter> session;
   std::size_t reported_warnings = 0;
   const double start_cpu_s = processSeconds();
   const double start_aside_s = asideSeconds();
@@ -135,6 +141,9 @@ void warnOfReplacement(Job& job) {
              earlier->keyframes);
 }
 
+/// Returns whether the result is there already.
+bool isComplete(const Job& job) { return job.stored && job.stored->is_complete; }
+
 /// The first look at a recording.
 struct Look {
   FirstPass first;
@@ -149,7 +158,7 @@ Look lookAt(Job& job) {
   Look look;
   auto held =
       std::make_unique<HeldRecording>(openRecording(job.sourceNow()), options.live.max_queue_mb);
-  if (!job.out.empty()) {  // a recording that cannot be opened replaces nothing
+  if (!job.out.empty() && !isComplete(job)) {  // a recording that cannot be opened replaces nothing
     warnOfReplacement(job);
     warnOfNew(job);
   }
@@ -239,6 +248,20 @@ RecordingKeyframes::Host interruptible(const Job& job, const char* activity) {
   return host;
 }
 
+/// Finds the keyframes of an earlier run.
+void findStored(Job& job) {
+  if (job.options.live.enabled) {
+    throw std::runtime_error(
+        "--resume with live.enabled = true: a run at the speed of the sensor "
+        "cannot go on: expected a run without one of them");
+  }
+  std::vector<std::string> notes;
+  job.stored = findStored(job, job.run, notes);
+  for (const std::string& note : notes) {
+    if (job.note) job.note("resume: " + note);
+  }
+}
+
 /// Passes over the recording for max_confidence = sequence: the robust maximum of the keyframes'
 /// confidences. It costs as much as the mapping. @return std::nullopt if there is no keyframe.
 std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
@@ -257,23 +280,52 @@ std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
 /// Checks the folder of the result, takes the first look, and makes the folder.
 /// @param folder stays empty if no file is written.
 Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
+  const bool has_session = kind == OutputKind::kMap && job.options.session && !job.out.empty();
   if (!job.out.empty()) {
     rejectReplacing(job.out, job.allInputs());
     ResultFolder::require(job.out, kind, job.force);
+    if (has_session || job.resume) job.run = runOf(job);
+    if (job.resume) findStored(job);
+    if (isComplete(job) && !job.needs_map) return Look();
   }
   Look look = lookAt(job);
   KeyframeMapperOptions& keyframe = job.options.mapper.keyframe;
   if (keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
-    keyframe.sequence_maximum = sequenceMaximum(job, look.first);
+    const nlohmann::ordered_json run = job.stored ? job.stored->session->run() : nullptr;
+    keyframe.sequence_maximum = run.contains("sequence_maximum")
+                                    ? run.at("sequence_maximum").get<double>()
+                                    : sequenceMaximum(job, look.first);
   }
   requireNoStop(job);
   if (job.out.empty()) return look;
-  folder.emplace(job.out, kind);
+  if (has_session) addChosen(job.run, look.recording->rig(), job.options, look.first.chosen);
+  if (job.stored) {
+    requireSameChoice(*job.stored, job.run);
+    keyframe.made_earlier = storedKeyframes(job.stored->session, job.stored->keyframes());
+    if (job.stored->is_complete) return look;
+  }
+  folder.emplace(job.out, kind, job.stored ? job.stored->folder : std::filesystem::path());
+  if (job.stored) job.stored->removeOthers(folder->path());
+  if (job.stored && has_session) {
+    const SessionFile file(folder->path() / "session.mcap");
+    job.session = std::make_unique<SessionWriter>(file, job.stored->keyframes());
+  }
   if (folder->left().empty()) return look;
+  const std::string left = fmt::format("a run that did not end left {} keyframes in {}",
+                                       countKeyframes(folder->left()), folder->left().string());
+  if (job.resume) {  // no part of the result
+    if (job.note) job.note(left + ", which are removed when this result is complete");
+    return look;
+  }
+  const bool can_resume =
+      !job.options.live.enabled && std::filesystem::exists(folder->left() / "session.mcap");
   addWarning(job.report.warnings, "left-result",
-             "a run that did not end left {} keyframes in {}; they are removed when this result is "
-             "complete",
-             countKeyframes(folder->left()), folder->left().string());
+             "{}{}; they are removed when this result is complete", left,
+             can_resume
+                 ? fmt::format("; `event-fusion map {} --out {} --resume`, with the options of "
+                               "that run, goes on with them, after this one is stopped",
+                               fmt::join(namesOf(job.source), " "), job.out.string())
+                 : "");
   warnOfNew(job);
   return look;
 }
@@ -281,6 +333,15 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
 MapOutput outputOf(const Job& job, const ResultFolder& folder) {
   return MapOutput(folder.path(), job.options.mapper.keyframe.planes,
                    job.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure);
+}
+
+/// Adds a keyframe to the session file. A result without keyframes has none.
+void store(Job& job, const ResultFolder& folder, const KeyframeDepthMap& keyframe) {
+  if (!job.options.session) return;
+  if (!job.session) {
+    job.session = std::make_unique<SessionWriter>(folder.path() / "session.mcap", job.run);
+  }
+  job.session->add(keyframe);
 }
 
 /// Fills in the report, except its points.
@@ -327,16 +388,17 @@ MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<con
               std::optional<UserError> error) {
   RunReport& report = job.report;
   report.peak_memory_bytes = peakMemoryBytes();
+  if (error) report.error = error->text;
   bool keeps_earlier = false;
   if (folder) {
     const bool has_earlier = folder->hasEarlier();
     keeps_earlier = has_earlier && report.counts.keyframes == 0;
     if (!keeps_earlier && !job.write_error) {
       write(job, [&] {
-        outputOf(job, *folder).writeText("report.json", [&](std::ostream& file) {
-          file << reportJson(report);
-        });
-        folder->commit();
+        const std::string json = reportJson(report);
+        if (job.session) job.session->finish(json);
+        outputOf(job, *folder).writeText("report.json", [&](std::ostream& file) { file << json; });
+        folder->commit(!report.stopped_at);
       });
     }
     if (job.write_error) {
@@ -346,7 +408,7 @@ MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<con
   }
   if (!error) error = job.write_error;
   warnOfNew(job);
-  return {std::move(report), std::move(map), std::move(error), keeps_earlier};
+  return {std::move(report), std::move(map), std::move(error), keeps_earlier, {}};
 }
 
 /// Throws the current error again, with what stays of the result; called within a handler.
@@ -447,17 +509,30 @@ void writePage(Job& job, const MapOutput& output, const MapSnapshot& map,
 
 MapResult mapInto(MapJob given) {
   Job job(std::move(given));
-  const bool writes = !job.out.empty();
-  job.options.mapper.keyframe.view_events = writes;  // the page shows them
+  job.options.mapper.keyframe.view_events = !job.out.empty();  // the page shows them
   std::optional<ResultFolder> folder;
   try {
     Look look = begin(job, OutputKind::kMap, folder);
+    MapResult result;
+    if (isComplete(job)) {
+      result.complete_before = job.stored->session->report();
+      result.kept_earlier = true;
+      result.map = std::make_shared<MapSnapshot>();
+      if (!job.needs_map) return result;
+    }
+    const bool writes = folder.has_value();
     std::optional<MapOutput> output;
     if (folder) output = outputOf(job, *folder);
     KeyframeSheet sheet;
     KeyframePictures pictures(job.options.mapper.keyframe.planes);
+    SessionCost cost;
+    std::size_t stored = job.stored ? job.stored->keyframes() : 0;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
-      output->writeKeyframe(keyframe);
+      const bool is_stored = stored > 0;
+      if (is_stored) --stored;
+      if (!is_stored) output->writeKeyframe(keyframe);
+      if (!is_stored) store(job, *folder, keyframe);
+      cost.depths += static_cast<std::uint64_t>(cv::countNonZero(keyframe.map.depth));
       sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
       pictures.add(keyframe.map.depth, keyframe.view_events);
     });
@@ -487,6 +562,17 @@ MapResult mapInto(MapJob given) {
     job.report.times.cpu.output += exporting.cpu.map;
     judgePoints(job.report, *map->points);
     endTimes(job);
+    if (!result.complete_before.empty()) {
+      result.map = std::move(map);
+      result.error = run.error();
+      return result;
+    }
+    if (job.session) {
+      if (job.options.refinement.enabled) job.session->addPoses(map->trajectory);
+      cost.bytes = job.session->bytes();
+      cost.seconds = job.session->seconds();
+      job.report.session = cost;
+    }
     if (has_files) writePage(job, *output, *map, pictures);
     return end(job, folder, std::move(map), run.error());
   } catch (...) {
@@ -536,21 +622,51 @@ MapResult mapWindowInto(MapJob given) {
   }
 }
 
+namespace {
+
+/// Returns what a complete report.json says.
+Report reportOf(std::string json) {
+  const auto values = nlohmann::json::parse(json);
+  Report report;
+  report.keyframes = values.at("keyframes");
+  report.points = values.at("points");
+  report.map_hash = values.value("map_hash", "");
+  for (const auto& warning : values.at("warnings")) {
+    report.warnings.push_back({warning.at("name"), warning.at("text")});
+  }
+  report.warnings = hostTexts(std::move(report.warnings), HostFace::kRecording);
+  const auto& quality = values.at("quality");
+  report.quality.word = fromName<QualityWord>(quality.at("word").get<std::string>());
+  report.quality.wrong_share = quality.value("wrong_share", 0.0);
+  report.quality.depth_error = quality.value("depth_error", 0.0);
+  report.quality.support = quality.value("support", 0.0);
+  report.quality.left_out = quality.at("left_out");
+  report.quality.reasons = quality.at("reasons").get<std::vector<std::string>>();
+  report.quality.keyframes = quality.at("keyframes").get<std::vector<float>>();
+  report.quality.much_worse = quality.at("much_worse").get<std::vector<std::size_t>>();
+  report.json = std::move(json);
+  return report;
+}
+
+}  // namespace
+
 Report mapRecording(const std::vector<std::filesystem::path>& files,
                     const std::filesystem::path& out, const Options& options,
-                    const Overrides& overrides) {
+                    const Overrides& overrides, bool resume) {
   MapResult result = forHost(HostFace::kRecording, [&] {
     MapJob job = MapJob::of(sourceOf(files, overrides), options);
     job.out = out;
+    job.resume = resume;
     MapResult made = mapInto(std::move(job));
     made.rejectError();
     return made;
   });
+  if (!result.complete_before.empty()) return reportOf(std::move(result.complete_before));
   RunReport& report = result.report;
   std::string json = reportJson(report);  // as the file, with the program's options
-  return {report.counts.keyframes, report.points,
-          hostTexts(std::move(report.warnings), HostFace::kRecording), std::move(report.quality),
-          std::move(json)};
+  return {report.counts.keyframes,   report.points,
+          report.map_hash,           hostTexts(std::move(report.warnings), HostFace::kRecording),
+          std::move(report.quality), std::move(json)};
 }
 
 }  // namespace efm

@@ -26,6 +26,8 @@ struct MapJob {
   bool force = false;           ///< Allow a folder that holds other files.
   bool plain_pictures = false;  ///< No enlargement or colour bar in depth.png and confidence.png.
   bool save_dsi = false;        ///< `mapWindowInto`: write the whole DSI.
+  bool resume = false;          ///< `mapInto`: go on with the keyframes of an earlier run.
+  bool needs_map = false;       ///< `mapInto`: give the map of a complete result, too.
   /// Further files that are read: the result must not replace them.
   std::vector<std::filesystem::path> inputs;
   Verbosity verbosity = Verbosity::kQuiet;
@@ -62,6 +64,9 @@ struct MapResult {
   /// Why the recording was not mapped to its end, or a file of the result could not be written.
   std::optional<UserError> error;
   bool kept_earlier = false;  ///< There is no new result: the folder's earlier result stays.
+  /// The content of report.json, if the result was complete before: `report` is empty, and so is
+  /// `map`, unless `needs_map`.
+  std::string complete_before;
 
   /// Throws the error, if there is one: std::invalid_argument for an option, else
   /// std::runtime_error.

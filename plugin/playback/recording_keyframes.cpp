@@ -36,6 +36,7 @@ RecordingKeyframes::RecordingKeyframes(Recording& recording, const EventFusionOp
   EventFusionOptions of_rig = options;
   of_rig.rig = {};  // the recording has its files
   of_rig.rig.pose_source = options.rig.pose_source;
+  of_rig.session_file.clear();  // the result's folder has it
   mapper_ = MapperDriver::make(of_rig, std::move(callbacks), {}, first_.quality);
   mapper_->setSink(host_.sink);
   mapper_->pullKeyframes();
@@ -65,6 +66,7 @@ std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
     std::optional<KeyframeDepthMap> made;
     const bool maps = attempt([&] { made = options_.live.enabled ? takeMade() : mapper_->next(); });
     if (made) {
+      made->after_stop = stopped_;
       depths_.add(*made);
       if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(*made));
       return made;

@@ -90,7 +90,10 @@ struct EventFusionOptions {
       true;  ///< Judge poses, cameras and the map; data that are not used are told always.
   /// Keyframes whose predicted fraction of right depths is lower are left out of the map. 0 to 1.
   double min_keyframe_quality = 0;
-  bool ply = false;  ///< `map` also writes map.ply, coloured by height.
+  bool ply = false;     ///< `map` also writes map.ply, coloured by height.
+  bool session = true;  ///< All keyframes are stored in a session file as they are made.
+  /// The session file of a Mapper or a map builder. Empty: none. `map` has its own.
+  std::filesystem::path session_file;
 
   /// Return the number of newest keyframes whose points are kept, and that the refinement may move.
   std::size_t keptKeyframes() const;

@@ -99,7 +99,7 @@ void MappingSession::addPose(const PoseSample& sample) {
   if (!error.empty()) throw std::invalid_argument(error);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // If two poses have the same time, the first one is used, and so is its noise.
-  if (refinement_ && used) store_.noises[source].try_emplace(sample.t_ns, sample.noise);
+  if (used) store_.noises[source].try_emplace(sample.t_ns, sample.noise);
 }
 
 /// Returns the stated noise of the last pose up to a time. Forgets the noise of earlier poses.
@@ -321,7 +321,8 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
 /// Inserts a keyframe into the cloud, refines it, and moves keyframes to their refined poses. Map,
 /// cloud and refinement number keyframes alike: after an error none has the keyframe.
 void MappingSession::insert(KeyframeDepthMap& keyframe) {
-  const Rigid3 T_odom_ref = keyframe.T_world_ref;
+  const Rigid3 T_odom_ref = keyframe.T_odom_ref;
+  keyframe.pose_noise = noiseAt(keyframe.window.t_ref_ns);
   if (quality_.keyframes() > 0) leaveOutBad(quality_.keyframes() - 1);
   std::optional<QualityStatistics::Judged> judged;
   if (options_.checks) judged = quality_.judge(keyframe, facts_);
@@ -339,7 +340,7 @@ void MappingSession::insert(KeyframeDepthMap& keyframe) {
       const StageScope scope(&status_.times, &StageSeconds::map, Processors::kThis);
       cloud_.insert(std::move(points), T_world_ref);
     }
-    if (refinement_) T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
+    if (refinement_) T_world_ref = refinement_->add(keyframe, keyframe.pose_noise);
     keyframe.T_world_ref = T_world_ref;
   } catch (...) {
     if (cloud_.T_world_ref().size() > inserted) cloud_.removeNewest();

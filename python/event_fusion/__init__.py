@@ -20,6 +20,7 @@ from ._engine import EVENT_DTYPE, Camera, Keyframe, simulation_presets
 from ._events import EventFusionWarning, events
 from ._mapping import Candidates, Dsi, Map, Mapper, candidates, dsi, keyframes, map
 from ._recording import Recording, open, read_cameras, read_poses, write_cameras, write_poses
+from ._session import Session
 from ._simulation import Simulation, perturb, simulate
 
 __version__ = _engine.VERSION
@@ -34,6 +35,7 @@ __all__ = [
     "Map",
     "Mapper",
     "Recording",
+    "Session",
     "Simulation",
     "candidates",
     "dsi",

@@ -209,6 +209,11 @@ class Mapper:
         return self._mapper.points()
 
     @property
+    def hash(self) -> str:
+        """SHA-256 of the points in any order: equal maps have equal hashes (docs/session.md)."""
+        return self._mapper.hash()
+
+    @property
     def trajectory(self) -> tuple[Array, Array]:
         """Times (n,) of the keyframes, nanoseconds, and T_world_ref (n, 4, 4)."""
         return self._mapper.trajectory()
@@ -264,9 +269,12 @@ class Map:
         options: Options | None,
         out: Path | None,
         force: bool,
+        resume: bool,
         keep: bool,
         progress: Progress,
     ) -> None:
+        if resume and out is None:
+            raise ValueError("resume=True: expected out=, the folder of the earlier run")
         checked = engine_options(options)
         recording = _opened(recording)
         self._keep = keep
@@ -284,7 +292,7 @@ class Map:
         source = recording._source
 
         def job(on_keyframe: Callable[[Keyframe], None]) -> _engine.MapResult:
-            return _engine.run_map(source, checked, folder, force, stop, on_keyframe, on_progress)
+            return _engine.run_map(source, checked, folder, force, resume, stop, on_keyframe, on_progress)
 
         self._recording = recording  # a simulated one is removed with its last user
         self._items = items
@@ -386,6 +394,11 @@ class Map:
         return report
 
     @property
+    def hash(self) -> str:
+        """SHA-256 of the points in any order: equal maps have equal hashes (docs/session.md)."""
+        return self._finished().hash()
+
+    @property
     def warnings(self) -> list[tuple[str, str]]:
         """Names and texts of the warnings."""
         return [(warning["name"], _engine.python_text(warning["text"])) for warning in self.report["warnings"]]
@@ -415,6 +428,7 @@ def map(
     out: Path | None = None,
     *,
     force: bool = False,
+    resume: bool = False,
     keep: bool = True,
     progress: Progress = False,
 ) -> Map:
@@ -431,6 +445,10 @@ def map(
         folder is made also if nothing uses the result.
     force : bool
         Allow a folder that holds other files.
+    resume : bool
+        Go on with the keyframes that an earlier run for this folder stored before it ended: the result is that of one
+        undisturbed run. They come again, without the confidences of pixels that have no depth. A complete result is
+        not changed.
     keep : bool
         False: a keyframe lives as long as the loop uses it, so that memory does not grow with the recording.
     progress : bool or callable
@@ -450,7 +468,7 @@ def map(
     OSError
         If the recording cannot be read to its end, has no keyframe, or a file cannot be written.
     """
-    return Map(recording, options, out, force, keep, progress)
+    return Map(recording, options, out, force, resume, keep, progress)
 
 
 class Dsi(tuple):  # type: ignore[type-arg]

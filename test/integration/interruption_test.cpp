@@ -69,7 +69,7 @@ class Interruption : public AppTest {
     std::set<std::string> expected = {"report.json"};
     if (keyframes > 0) {
       expected.insert({"keyframes", "map.html", "map.pcd", "map.png", "map.simplemap",
-                       "overview.png", "trajectory.txt"});
+                       "overview.png", "session.mcap", "trajectory.txt"});
       if (report.contains("refinement")) expected.insert("trajectory_tracker.txt");
       const auto poses = readPoses(out() / "trajectory.txt");
       EXPECT_EQ(poses.size(), keyframes);

@@ -16,19 +16,8 @@
 namespace efm {
 namespace {
 
-struct McapRecord {
-  McapOp op;
-  ByteReader content;
-};
-
 ByteReader readerOf(std::string_view bytes) {
   return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
-}
-
-McapRecord takeMcapRecord(ByteReader& bytes) {
-  const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
-  const std::uint64_t size = bytes.number<std::uint64_t>();
-  return {op, ByteReader(bytes.take(size), size)};
 }
 
 std::int64_t logTime(std::uint64_t t_ns) {

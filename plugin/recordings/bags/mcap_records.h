@@ -141,6 +141,18 @@ Record takeMcapFields(ByteReader& content) {
   return record;
 }
 
+struct McapRecord {
+  McapOp op;
+  ByteReader content;
+};
+
+/// Takes a record. @throws std::runtime_error if the bytes end before it.
+inline McapRecord takeMcapRecord(ByteReader& bytes) {
+  const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
+  const auto size = bytes.number<std::uint64_t>();
+  return {op, ByteReader(bytes.take(size), size)};
+}
+
 /// Appends numbers, and texts after their size.
 template <typename... Fields>
 void appendMcapFields(std::string& bytes, const Fields&... fields) {

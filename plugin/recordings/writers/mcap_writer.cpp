@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
-#include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -9,82 +7,16 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <type_traits>
 
-#include "mapping/base/number_bytes.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/bags/mcap_records.h"
+#include "plugin/recordings/writers/mcap_file.h"
 #include "plugin/recordings/writers/recording_writer.h"
 
 namespace efm {
 namespace {
 
-/// Writes a ROS 2 message in CDR: after 4 bytes of header, values are at multiples of their size.
-class CdrWriter {
- public:
-  /// Adds numbers, and texts, which end with a zero.
-  template <typename... Values>
-  CdrWriter& add(const Values&... values) {
-    (addOne(values), ...);
-    return *this;
-  }
-  /// The whole message; bytes may be appended to it.
-  std::string& bytes() { return bytes_; }
-
- private:
-  void addOne(std::string_view text) {
-    addOne(static_cast<std::uint32_t>(text.size() + 1));
-    bytes_.append(text).push_back('\0');
-  }
-  template <typename Number, typename = std::enable_if_t<std::is_arithmetic_v<Number>>>
-  void addOne(Number value) {
-    const std::size_t over = (bytes_.size() - kHeader) % sizeof(Number);
-    if (over > 0) bytes_.append(sizeof(Number) - over, '\0');
-    appendLittleEndian(bytes_, value);
-  }
-
-  static constexpr std::size_t kHeader = 4;
-  std::string bytes_ = std::string("\0\1\0\0", kHeader);  // little-endian
-};
-
-/// The definitions of the written ROS 2 messages and of the types inside them, in MCAP's form
-/// (schema encoding ros2msg).
-
-#define EFM_RULE \
-  "================================================================================\n"
-#define EFM_HEADER                                                                  \
-  EFM_RULE                                                                          \
-  "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" EFM_RULE \
-  "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-
-constexpr const char* kEventPacketSchema =
-    "std_msgs/Header header\nuint32 height\nuint32 width\nuint64 seq\nuint64 time_base\n"
-    "string encoding\nbool is_bigendian\nuint8[] events\n" EFM_HEADER;
-
-constexpr const char* kPoseStampedSchema =
-    "std_msgs/Header header\ngeometry_msgs/Pose pose\n" EFM_HEADER EFM_RULE
-    "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion "
-    "orientation\n" EFM_RULE "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n" EFM_RULE
-    "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
-
-constexpr const char* kCameraInfoSchema =
-    "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\n"
-    "float64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\n"
-    "sensor_msgs/RegionOfInterest roi\n" EFM_HEADER EFM_RULE
-    "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\n"
-    "uint32 width\nbool do_rectify\n";
-
-#undef EFM_HEADER
-#undef EFM_RULE
-
 constexpr std::size_t kMcapChunkBytes = 1 << 20;
-constexpr int kZstdLevel = 1;
 constexpr std::uint16_t kPoseChannel = 1;
-
-std::uint32_t checksumOf(std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 /// Returns a camera's channel of events; its camera info is the next one. Poses have channel 1.
 std::uint16_t eventsChannel(std::size_t camera) {
@@ -100,8 +32,7 @@ void addSize(CdrWriter& message, const CameraModel& model) {
 void addCamera(CdrWriter& message, const CameraModel& model) {
   addSize(message, model);
   message.add(model.distortion == DistortionModel::kEquidistant ? "equidistant" : "plumb_bob");
-  message.add(static_cast<std::uint32_t>(model.coefficients.size()));
-  for (const double value : model.coefficients) message.add(value);
+  message.add(model.coefficients);
   const double fx = model.fx, fy = model.fy, cx = model.cx, cy = model.cy;
   message.add(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);                 // K
   message.add(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);             // R
@@ -114,18 +45,10 @@ class McapWriter : public RecordingWriter {
   McapWriter(const std::filesystem::path& file, const Rig& rig)
       : file_(file),
         output_(file_.temporary(), file_.path()),
+        mcap_(topicsOf(rig), [this](std::uint64_t, const std::string& bytes) { write(bytes); }),
         rig_(rig),
         next_sequence_(rig.cameras.size()) {
-    channels_.push_back({"geometry_msgs/msg/PoseStamped", kPoseStampedSchema, "/pose"});
-    for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
-      const std::string name = "/" + frameOf(camera);
-      channels_.push_back(
-          {"event_camera_msgs/msg/EventPacket", kEventPacketSchema, name + "/events"});
-      channels_.push_back({"sensor_msgs/msg/CameraInfo", kCameraInfoSchema, name + "/camera_info"});
-    }
-    std::string begin(kMcapMagic);
-    appendMcapRecord(begin, McapHeader{"ros2", "event-fusion-mapper"});
-    write(begin + channelRecords());
+    mcap_.begin();
   }
 
   void addEvents(std::size_t camera, const std::vector<Event>& events) override {
@@ -150,46 +73,23 @@ class McapWriter : public RecordingWriter {
   }
 
   void close() override {
-    finishChunk();
-    write(McapDataEnd{});  // the data have no checksum: each chunk has one
-    std::string summary = channelRecords() + chunk_indexes_ + statistics();
-    McapFooter footer = {position_};
-    appendMcapRecord(summary, footer);
-    summary.resize(summary.size() - sizeof(footer.checksum));
-    appendLittleEndian(summary, checksumOf(summary));
-    write(summary.append(kMcapMagic));
+    mcap_.end();
     output_.close();
     file_.replace();
   }
 
  private:
-  struct Channel {
-    std::string schema_name;
-    std::string schema;
-    std::string topic;
-    std::uint64_t messages = 0;
-    std::string index = {};  // index of the chunk: time and position of each message
-  };
-  struct Span {
-    std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max();
-    std::uint64_t last_ns = 0;
-    void add(std::uint64_t t_ns) {
-      first_ns = std::min(first_ns, t_ns);
-      last_ns = std::max(last_ns, t_ns);
+  static std::vector<McapTopic> topicsOf(const Rig& rig) {
+    std::vector<McapTopic> topics = {
+        {"geometry_msgs/msg/PoseStamped", ros_schema::kPoseStamped, "/pose"}};
+    for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
+      const std::string name = "/" + frameOf(camera);
+      topics.push_back(
+          {"event_camera_msgs/msg/EventPacket", ros_schema::kEventPacket, name + "/events"});
+      topics.push_back(
+          {"sensor_msgs/msg/CameraInfo", ros_schema::kCameraInfo, name + "/camera_info"});
     }
-  };
-
-  /// Returns schemas and channels. Each channel has its own schema, with the channel's id.
-  std::string channelRecords() const {
-    std::string schemas;
-    std::string channels;
-    std::uint16_t id = 0;
-    for (const Channel& channel : channels_) {
-      ++id;
-      appendMcapRecord(schemas, McapSchema{id, channel.schema_name, "ros2msg", channel.schema});
-      appendMcapRecord(channels, McapChannel{id, id, channel.topic, "cdr", {}});
-    }
-    return schemas + channels;
+    return topics;
   }
 
   /// Returns a message that has only its header.
@@ -232,89 +132,20 @@ class McapWriter : public RecordingWriter {
   }
 
   void addMessage(int channel, std::int64_t t_ns, const std::string& data) {
-    const auto log_ns = static_cast<std::uint64_t>(t_ns);
-    Channel& entry = channels_[static_cast<std::size_t>(channel - 1)];
-    appendMcapFields(entry.index, log_ns, std::uint64_t{chunk_.size()});
-    const auto number = static_cast<std::uint32_t>(entry.messages++);
-    appendMcapRecord(
-        chunk_, McapMessage{static_cast<std::uint16_t>(channel), number, log_ns, log_ns}, data);
-    chunk_span_.add(log_ns);
-    file_span_.add(log_ns);
-    if (chunk_.size() >= kMcapChunkBytes) finishChunk();
+    mcap_.add(channel, static_cast<std::uint64_t>(t_ns), data);
+    if (mcap_.pendingBytes() >= kMcapChunkBytes) mcap_.finishChunk();
   }
 
-  void finishChunk() {
-    if (chunk_.empty()) return;
-    std::string packed(ZSTD_compressBound(chunk_.size()), '\0');
-    const std::uint64_t size =
-        ZSTD_compress(packed.data(), packed.size(), chunk_.data(), chunk_.size(), kZstdLevel);
-    if (ZSTD_isError(size) != 0) {
-      throw std::runtime_error(file_.path().string() + ": " + ZSTD_getErrorName(size));
-    }
-    packed.resize(size);
-    const auto [first_ns, last_ns] = chunk_span_;
-    const std::uint64_t begin = position_;
-    write(McapChunk{first_ns, last_ns, chunk_.size(), checksumOf(chunk_), "zstd", size}, packed);
-
-    const std::uint64_t end = position_;
-    std::string positions;
-    std::uint16_t id = 0;
-    for (Channel& channel : channels_) {
-      ++id;
-      if (channel.index.empty()) continue;
-      appendMcapFields(positions, id, position_);
-      write(McapMessageIndex{id, channel.index});
-      channel.index.clear();
-    }
-    appendMcapRecord(chunk_indexes_,
-                     McapChunkIndex{first_ns, last_ns, begin, end - begin, positions,
-                                    position_ - end, "zstd", size, chunk_.size()});
-    ++chunks_;
-    chunk_.clear();
-    chunk_span_ = {};
-  }
-
-  std::string statistics() const {
-    std::uint64_t messages = 0;
-    std::string counts;
-    std::uint16_t id = 0;
-    for (const Channel& channel : channels_) {
-      messages += channel.messages;
-      appendMcapFields(counts, ++id, channel.messages);
-    }
-    McapStatistics statistics = {messages, id, id};
-    statistics.chunks = chunks_;
-    statistics.first_log_ns = messages > 0 ? file_span_.first_ns : 0;
-    statistics.last_log_ns = file_span_.last_ns;
-    statistics.channel_messages = counts;
-    std::string record;
-    appendMcapRecord(record, statistics);
-    return record;
-  }
-
-  template <typename Record>
-  void write(const Record& record, std::string_view data = {}) {
-    std::string bytes;
-    appendMcapRecord(bytes, record, data);
-    write(bytes);
-  }
   void write(const std::string& bytes) {
     output_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    position_ += bytes.size();
     output_.requireWritten();
   }
 
   AtomicFile file_;
   OutputFile output_;
-  std::uint64_t position_ = 0;
+  McapFile mcap_;
   Rig rig_;
-  std::vector<Channel> channels_;             // the first has id 1
   std::vector<std::uint64_t> next_sequence_;  // per camera
-  std::string chunk_;                         // records
-  Span chunk_span_;
-  Span file_span_;
-  std::string chunk_indexes_;  // records
-  std::uint32_t chunks_ = 0;
 };
 
 }  // namespace

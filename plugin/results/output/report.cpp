@@ -9,6 +9,7 @@
 #include <cmath>
 #include <variant>
 
+#include "event_fusion/engine.h"
 #include "mapping/geometry/rigid3.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/options/option_keys.h"
@@ -86,26 +87,6 @@ Json byGrowth(const StageSeconds& cpu) {
         {"map", cpu.map},
         {"images", cpu.images}}},
       {"other", std::max(0.0, cpu.total - measured)}};
-}
-
-Json asJson(const EventFusionOptions& options) {
-  Json json = Json::object();
-  for (const NamedOption& option : listOptions(options)) {
-    std::visit(
-        [&](const auto& value) {
-          json[std::string(option.section)][std::string(option.key)] = value;
-        },
-        option.value);
-  }
-  return json;
-}
-
-Json asJson(const TrackerFaults& faults) {
-  Json json = Json::object();
-  for (const auto& named : listTrackerFaults(faults)) {
-    std::visit([&](const auto& value) { json[named.first] = value; }, named.second);
-  }
-  return json;
 }
 
 Json asJson(const MapExtent& extent) {
@@ -214,6 +195,7 @@ std::uint64_t peakMemoryBytes() {
 void describePoints(const MapCloud& cloud, RunReport& report) {
   constexpr double kFar = 0.001;
   report.points = cloud.size();
+  report.map_hash = mapHash(cloud);
   report.extent = extentOf(cloud);
   report.most_extent = extentOf(cloud, kFar);
 }
@@ -245,6 +227,7 @@ std::string reportJson(const RunReport& report) {
   json["skipped_events"] = report.skipped_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
+  if (!report.map_hash.empty()) json["map_hash"] = report.map_hash;
   const PixelCounts& pixels = report.pixels;
   json["pixels"] = {{"candidates", pixels.candidates},
                     {"at_nearest", pixels.at_nearest},
@@ -266,6 +249,7 @@ std::string reportJson(const RunReport& report) {
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
+  if (!report.error.empty()) json["error"] = report.error;
   if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
   if (!report.notes.empty()) json["notes"] = asJson(report.notes);
@@ -279,6 +263,11 @@ std::string reportJson(const RunReport& report) {
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
+  if (const auto& session = report.session) {
+    json["session"] = {{"bytes", session->bytes},
+                       {"bytes_per_depth", session->bytesPerDepth()},
+                       {"seconds", session->seconds}};
+  }
   if (!report.chosen.empty()) json["chosen"] = asJson(report.chosen);
   json["options"] = asJson(report.options);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -387,6 +376,7 @@ std::string summaryOf(const RunReport& report, OutputKind kind,
     addLine(text, "keyframes", std::to_string(report.counts.keyframes));
   }
   addLine(text, "points", std::to_string(report.points));
+  if (!report.map_hash.empty()) addLine(text, "hash", report.map_hash);
   if (report.most_extent) addLine(text, "extent", extentText(*report.most_extent));
   const EventCounts events = report.counts.total();
   if (events.read > 0) addLine(text, "events", eventsText(events));

@@ -46,6 +46,16 @@ struct PoseShift {
 PoseShift shiftBetween(const std::vector<StampedPose>& before,
                        const std::vector<StampedPose>& after);
 
+/// The size of a session file, and what it cost.
+struct SessionCost {
+  std::uint64_t bytes = 0;
+  std::uint64_t depths = 0;  ///< Of all keyframes.
+  double seconds = 0;        ///< Until the disk had the keyframes, beside the mapping.
+  double bytesPerDepth() const {
+    return depths > 0 ? static_cast<double>(bytes) / static_cast<double>(depths) : 0;
+  }
+};
+
 /// The counts, times and options of a run: the content of report.json.
 struct RunReport {
   std::vector<std::string> recording;  ///< Absolute names of the recording's files.
@@ -53,6 +63,7 @@ struct RunReport {
   std::vector<std::uint64_t> silent_keyframes;  ///< Keyframes without events of a camera.
   std::optional<LiveStatus> live;               ///< The state of live operation.
   std::uint64_t points = 0;                     ///< Number of points of the exported map.
+  std::string map_hash;                         ///< `mapHash` of the exported map.
   PixelCounts pixels;                           ///< Pixels of all keyframes.
   std::optional<MapExtent> extent;              ///< The box around all points.
   /// The box of 0.1 to 99.9 % of the points on each axis: a few wrong points are far away.
@@ -74,6 +85,8 @@ struct RunReport {
   std::optional<double> baseline_m;
   /// The fraction of the recording that was mapped, if the run was interrupted.
   std::optional<double> stopped_at;
+  std::optional<SessionCost> session;
+  std::string error;  ///< Why the recording was not mapped to its end; empty if it was.
   std::uint64_t skipped_events = 0;  ///< Bad events that the reader left out.
   std::vector<Warning> warnings;
   std::vector<Warning> notes;  ///< What could not be checked.
@@ -86,22 +99,24 @@ void describePoints(const MapCloud& cloud, RunReport& report);
 /// Returns the report as indented JSON: schema (1), events (total and per camera; read = used +
 /// without_pose + outside_window + late + dropped + unselected + filtered + outside_lens +
 /// over_budget), event_uses, votes (their sum is event_uses x planes), keyframes, silent
-/// (keyframes per camera, sub-intervals), points, extent_m (min and max, frame `world`; absent
-/// without points), pixels (see PixelCounts), most_extent_m (the extent of 0.1 to 99.9 % of the
-/// points on each axis), recording_seconds (first event to last event), seconds (real time),
-/// cpu_seconds (processor time: once per run, for events, for keyframes), votes_per_second,
-/// sorted_events, skipped_events (bad events that the reader left out), refinement if poses were
-/// refined (registered keyframes; loops; failed_solves; failures: errors, after which a keyframe
-/// keeps the tracker's motion; last_error; the learnt errors of the tracker; moved: the shift of
-/// the poses), kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m
-/// if known, stopped_at if the run was interrupted (the fraction of the recording that was mapped),
-/// live in live operation (drop_ratio; counts of each camera's events before the mapping;
-/// windows_dropped and the reasons; late_events, pose_jumps, clock_resets, rejected_poses, errors
-/// and last_error), warnings (each with name and text), notes (the same; absent if there are none),
-/// quality (see MapQuality: word, wrong_share, depth_error, support, agreement and sharpness if
-/// known, left_out, reasons, keyframes, much_worse), recording (the files), perturbation (the
-/// faults of the poses, if any), chosen (the automatic options: key, value and reason), options
-/// (all options with the used values) and version. Bytes of names that are not UTF-8 become U+FFFD.
+/// (keyframes per camera, sub-intervals), points, map_hash (see `mapHash`), extent_m (min and max,
+/// frame `world`; absent without points), pixels (see PixelCounts), most_extent_m (the extent of
+/// 0.1 to 99.9 % of the points on each axis), recording_seconds (first event to last event),
+/// seconds (real time), cpu_seconds (processor time: once per run, for events, for keyframes),
+/// votes_per_second, sorted_events, skipped_events (bad events that the reader left out),
+/// refinement if poses were refined (registered keyframes; loops; failed_solves; failures: errors,
+/// after which a keyframe keeps the tracker's motion; last_error; the learnt errors of the tracker;
+/// moved: the shift of the poses), kernel, threads, peak_memory_bytes (of this process),
+/// reference_view and baseline_m if known, stopped_at if the run was interrupted (the fraction of
+/// the recording that was mapped), error if it was not mapped to its end, live in live operation
+/// (drop_ratio; counts of each camera's events before the mapping; windows_dropped and the reasons;
+/// late_events, pose_jumps, clock_resets, rejected_poses, errors and last_error), warnings (each
+/// with name and text), notes (the same; absent if there are none), quality (see MapQuality: word,
+/// wrong_share, depth_error, support, agreement and sharpness if known, left_out, reasons,
+/// keyframes, much_worse), recording (the files), session (bytes of session.mcap, per depth of a
+/// keyframe, and the time to write it, beside the mapping), perturbation (the faults of the poses,
+/// if any), chosen (the automatic options: key, value and reason), options (all options with the
+/// used values) and version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const RunReport& report);
 
 /// Return lists of objects with the keys of the report: key, value and reason; name and text.

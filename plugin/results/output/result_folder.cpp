@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <climits>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -30,9 +32,11 @@ namespace fs = std::filesystem;
 constexpr const char* kReport = "report.json";
 constexpr const char* kKeyframes = "keyframes";
 constexpr const char* kLock = "run.lock";
-constexpr std::array<std::string_view, 8> kMapFiles = {
+constexpr const char* kSession = "session.mcap";
+constexpr std::array<std::string_view, 9> kMapFiles = {
     "map.html",      "map.pcd",      "map.png",        "map.ply",
-    "map.simplemap", "overview.png", "trajectory.txt", "trajectory_tracker.txt"};
+    "map.simplemap", "overview.png", "trajectory.txt", "trajectory_tracker.txt",
+    kSession};
 constexpr std::array<std::string_view, 2> kDepthFiles = {"points.pcd", "dsi.npy"};
 /// The images of one depth map.
 constexpr std::array<std::string_view, 5> kImages = {
@@ -242,18 +246,59 @@ void rejectInTheWay(const fs::path& target, Kinds kinds) {
   }
 }
 
-bool isAtWork(const fs::path& partial) {
+std::string hostName() {
+  std::array<char, HOST_NAME_MAX + 1> name{};
+  ::gethostname(name.data(), HOST_NAME_MAX);
+  return name.data();
+}
+
+/// The run that is at work in a folder.
+struct Worker {
+  std::string name = "another run";  // "process 42 on HOST"
+  bool is_locked = true;             // false: its file was touched in the last minute
+};
+
+/// Returns the age of a file in seconds, by the clock of its file system.
+std::int64_t ageOf(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return 0;
+  std::int64_t now_s = ::time(nullptr);
+  std::string probe = (file.parent_path() / "run.probe-XXXXXX").string();
+  struct stat probed {};
+  if (const int made = ::mkstemp(probe.data()); made >= 0) {
+    if (::fstat(made, &probed) == 0) now_s = probed.st_mtim.tv_sec;
+    ::close(made);
+    ::unlink(probe.c_str());
+  }
+  return now_s - status.st_mtim.tv_sec;
+}
+
+std::optional<Worker> workerIn(const fs::path& partial) {
+  constexpr std::int64_t kSilentS = 60;
+  std::string kind, host;
+  int process = 0;
+  std::ifstream(partial / kLock) >> kind >> process >> host;
   const int file = ::open((partial / kLock).c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
+  if (file < 0) return std::nullopt;
   flock lock = wholeFile();
   const bool asked = ::fcntl(file, F_OFD_GETLK, &lock) == 0;
   ::close(file);
-  return asked && lock.l_type != F_UNLCK;
+  Worker worker;
+  worker.is_locked = asked && lock.l_type != F_UNLCK;
+  if (!host.empty()) worker.name = fmt::format("process {} on {}", process, host);
+  if (worker.is_locked) return worker;
+  const bool is_here = host == hostName();
+  const bool is_dead = is_here && (asked || (::kill(process, 0) != 0 && errno == ESRCH));
+  if (host.empty() || is_dead || ageOf(partial / kLock) >= kSilentS) return std::nullopt;
+  return worker;
 }
 
-std::runtime_error atWork(const fs::path& out) {
-  return std::runtime_error(out.string() +
-                            ": another run is writing its result there: expected another folder");
+std::runtime_error atWork(const fs::path& out, const fs::path& partial) {
+  const Worker worker = workerIn(partial).value_or(Worker());
+  return std::runtime_error(
+      fmt::format("{}: {} is writing its result there ({}): expected another folder, or {}",
+                  out.string(), worker.name, (partial / kLock).string(),
+                  worker.is_locked ? "the end of that run" : "60 s without a sign of that run"));
 }
 
 /// Rejects a folder that another run is writing for, also if it writes in another place.
@@ -261,7 +306,7 @@ void rejectAtWork(const ResultFolder::Places& places, const fs::path& out) {
   const fs::path& target = places.target;
   for (const fs::path& partial : {places.partial, target, fs::path(target.string() + ".partial"),
                                   target / "result.partial"}) {
-    if (isAtWork(partial)) throw atWork(out);
+    if (workerIn(partial)) throw atWork(out, partial);
   }
 }
 
@@ -397,44 +442,117 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   }
 }
 
-ResultFolder::Lock::~Lock() {
-  if (file >= 0) ::close(file);
+std::vector<fs::path> ResultFolder::storedIn(const fs::path& out) {
+  const Places places(out, OutputKind::kMap);
+  return {places.target, places.partial, places.left};
 }
 
-ResultFolder::ResultFolder(fs::path out, OutputKind kind)
+ResultFolder::ResultFolder(fs::path out, OutputKind kind, const fs::path& resume)
     : out_(std::move(out)), kind_(kind), places_(out_, kind) {
   rejectAtWork(places_, out_);
   rejectForeign(places_);
   makeFolder(places_.partial);
   lock();
   recover(places_);
-  std::ofstream(places_.partial / kLock) << (kind == OutputKind::kDepth ? "depth" : "map");
-  if (countKeyframes(places_.partial) > 0) moveResult(places_.partial, places_.left);
+  if (resume.empty()) {
+    setAside();
+  } else if (resume != places_.partial) {
+    takeStored(resume);
+  }
+  stays_ = !resume.empty();
+  if (fs::exists(places_.left)) left_ = places_.left;
+}
+
+/// Renames the files of a killed run to OUT.left. Removes them if OUT.left has more keyframes.
+void ResultFolder::setAside() {
+  const std::uint64_t keyframes = countKeyframes(places_.partial);
+  if (keyframes > 0 && keyframes >= countKeyframes(places_.left)) {
+    removeResult(places_.left);
+    if (fs::exists(places_.left)) {  // with files of others
+      moveResult(places_.partial, places_.left);
+    } else {
+      fs::rename(places_.partial, places_.left);
+      makeFolder(places_.partial);
+      lock();
+    }
+  }
   const ResultFiles useless = filesIn(places_.partial);
   for (const fs::path& file : useless.files) {
     if (file != kLock) ::unlink((places_.partial / file).c_str());
   }
   removeEmpty(places_.partial, useless);
-  if (fs::exists(places_.left)) left_ = places_.left;
 }
 
-/// Locks the folder. @throws std::runtime_error if another run has it.
-void ResultFolder::lock() {
-  const fs::path path = places_.partial / kLock;
+/// Makes the files of an earlier run those of this one. Those of OUT stay: its session is copied,
+/// and its images have a second name.
+void ResultFolder::takeStored(const fs::path& from) {
+  if (from == places_.left) {
+    const fs::path other = from.string() + ".other";
+    const bool has_other = countKeyframes(places_.partial) > 0;
+    if (has_other) fs::rename(places_.partial, other);
+    if (!has_other) removeResult(places_.partial);
+    fs::rename(from, places_.partial);
+    if (has_other) fs::rename(other, from);
+    return lock();
+  }
+  setAside();
+  fs::copy_file(from / kSession, places_.partial / kSession);
+  for (const fs::path& file : filesIn(from, kindsOf(kind_)).files) {
+    if (file.begin()->string() != kKeyframes) continue;
+    fs::create_directories((places_.partial / file).parent_path());
+    std::error_code error;
+    fs::create_hard_link(from / file, places_.partial / file, error);
+    if (error) fs::copy_file(from / file, places_.partial / file);
+  }
+}
+
+bool ResultFolder::Lock::take(const fs::path& path, const std::string& kind) {
   struct stat status {};
   do {  // again, if a run that ended meanwhile has removed the file
-    if (lock_.file >= 0) ::close(std::exchange(lock_.file, -1));
-    lock_.file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (lock_.file < 0) {
+    release();
+    file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (file_ < 0) {
       const std::string why = reasonNotWritten(errno);
       throw std::runtime_error("cannot write " + path.string() + ": " +
                                (why.empty() ? std::strerror(errno) : why));
     }
     flock lock = wholeFile();
-    if (::fcntl(lock_.file, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
-      throw atWork(out_);
-    }  // on a file system without locks, another run is not detected
-  } while (::fstat(lock_.file, &status) == 0 && status.st_nlink == 0);
+    if (::fcntl(file_, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
+      return false;
+    }  // on a file system without locks, the time of the file tells another run
+  } while (::fstat(file_, &status) == 0 && status.st_nlink == 0);
+  kind_ = kind;
+  std::ofstream(path) << fmt::format("{} {} {}\n", kind, ::getpid(), hostName());
+  ending_ = false;
+  thread_ = std::thread([this] {
+    constexpr std::chrono::seconds kPeriod(10);
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!ends_.wait_for(lock, kPeriod, [this] { return ending_; })) ::futimens(file_, nullptr);
+  });
+  return true;
+}
+
+void ResultFolder::Lock::release() {
+  if (thread_.joinable()) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ending_ = true;
+    }
+    ends_.notify_all();
+    thread_.join();
+    if (::ftruncate(file_, 0) != 0 ||
+        ::pwrite(file_, kind_.data(), kind_.size(), 0) < 0) {  // no worker any more
+      errno = 0;
+    }
+  }
+  if (file_ >= 0) ::close(std::exchange(file_, -1));
+}
+
+/// Locks the folder. @throws std::runtime_error if another run has it.
+void ResultFolder::lock() {
+  if (!lock_.take(places_.partial / kLock, kind_ == OutputKind::kDepth ? "depth" : "map")) {
+    throw atWork(out_, places_.partial);
+  }
 }
 
 ResultFolder::~ResultFolder() {
@@ -445,9 +563,9 @@ ResultFolder::~ResultFolder() {
   }
 }
 
-void ResultFolder::commit() {
+void ResultFolder::commit(bool is_whole) {
   try {
-    replace();
+    replace(is_whole);
   } catch (const fs::filesystem_error& error) {
     throw std::runtime_error(fmt::format("cannot replace {}: {} ({}); the new result is in {}",
                                          out_.string(), error.code().message(),
@@ -455,9 +573,9 @@ void ResultFolder::commit() {
   }
 }
 
-void ResultFolder::replace() {
+void ResultFolder::replace(bool is_whole) {
   const auto& [target, in_place, partial, left, earlier, moving] = places_;
-  stays_ = true;
+  stays_ = replaces_ = true;
   const ResultFiles found = filesIn(partial);
   for (const fs::path& file : found.files) syncToDisk(partial / file);
   for (const fs::path& folder : found.folders) syncToDisk(partial / folder);
@@ -482,7 +600,7 @@ void ResultFolder::replace() {
   syncToDisk(target.parent_path());
   moveOthers(used.earlier, target);  // they came meanwhile
   removeResult(used.earlier);
-  removeResult(left);
+  if (is_whole) removeResult(left);
 }
 
 /// Exchanges the names of the new result and of the folder that is there. @return false if it
@@ -510,16 +628,20 @@ bool ResultFolder::exchange() {
 }
 
 std::string ResultFolder::abandon() {
-  if (stays_) return {};  // the error of `commit` says what is where
-  if (hasEarlier()) return fmt::format("; the earlier result in {} stays", out_.string());
+  if (replaces_) return {};  // the error of `commit` says what is where
+  const std::string earlier =
+      hasEarlier() ? fmt::format("; the earlier result in {} stays", out_.string()) : "";
   try {
     const std::uint64_t keyframes = countKeyframes(places_.partial);
     stays_ = keyframes > 0;
-    if (!stays_) return {};
-    return fmt::format("; the keyframes before it ({}) are in {}", keyframes,
-                       places_.partial.string());
+    if (!stays_) return earlier;
+    return earlier + fmt::format("; the keyframes before it ({}) are in {}{}", keyframes,
+                                 places_.partial.string(),
+                                 fs::exists(places_.partial / kSession)
+                                     ? ": run again with --resume to go on with them"
+                                     : "");
   } catch (const fs::filesystem_error&) {  // the disk cannot be read
-    return {};
+    return earlier;
   }
 }
 

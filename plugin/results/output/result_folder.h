@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace efm {
 
 /// The kind of files in a folder. A folder holds one kind.
 enum class OutputKind {
-  /// map.pcd, map.ply, map.simplemap, map.html, map.png, overview.png, trajectory.txt, report.json,
-  /// keyframes/<t_ref>/ with images
+  /// map.pcd, map.ply, map.simplemap, map.html, map.png, overview.png, trajectory.txt,
+  /// session.mcap,
+  /// report.json, keyframes/<t_ref>/ with images
   kMap,
   kDepth,  ///< The images of one keyframe, points.pcd, dsi.npy, report.json.
 };
@@ -31,8 +35,13 @@ struct EarlierResult {
 /// The files are written to OUT.partial. At the end both folders exchange their names, and the
 /// earlier result is removed. If the file system cannot exchange names, the earlier result is
 /// OUT.earlier for a moment; after a crash in that moment, the next run gives it its name back. The
-/// files of a run that was killed stay in OUT.partial. The next run renames that folder to
-/// OUT.left, and removes it when its own result is whole.
+/// files of a run that was killed stay in OUT.partial. The next run goes on with them, or renames
+/// that folder to OUT.left (if that exists, the folder with more keyframes stays), and removes it
+/// when its own result is whole.
+///
+/// The file run.lock in OUT.partial names the run's host and process, is locked, and is touched
+/// every 10 s. Where another host's lock is not seen (some network file systems), a file that was
+/// touched in the last minute is a run at work.
 ///
 /// Where OUT cannot be renamed (a mount point, the working folder, a parent that cannot be written)
 /// or holds other files, which stay, the folders lie within OUT: result.partial, result.left,
@@ -51,10 +60,17 @@ class ResultFolder {
   /// Returns whether a run is writing a result for this folder or into it, or left one there.
   static bool hasPartial(const std::filesystem::path& out);
 
+  /// Returns the folders where an earlier run for OUT may have stored keyframes: OUT, then those of
+  /// runs that were killed.
+  static std::vector<std::filesystem::path> storedIn(const std::filesystem::path& out);
+
   /// Makes the folder that is written to. No other run can do so until this object is destroyed.
+  /// @param resume one of `storedIn`, whose files are in the folder then: empty, none. OUT keeps
+  /// its own.
   /// @throws std::runtime_error naming the folder if it cannot be made, or another run is at work.
-  ResultFolder(std::filesystem::path out, OutputKind kind);
-  /// Removes the files, unless `commit` or `abandon` was called.
+  ResultFolder(std::filesystem::path out, OutputKind kind,
+               const std::filesystem::path& resume = {});
+  /// Removes the files, unless `commit` or `abandon` was called, or the run goes on with others.
   ~ResultFolder();
   ResultFolder(const ResultFolder&) = delete;
   ResultFolder& operator=(const ResultFolder&) = delete;
@@ -69,9 +85,10 @@ class ResultFolder {
   bool hasEarlier() const { return earlierResult(out_).has_value(); }
 
   /// Waits until all files are on the disk, and replaces the earlier result.
+  /// @param is_whole false: the run was stopped; the files of killed runs stay.
   /// @throws std::runtime_error. Then the earlier result is there, and the files stay in `path`.
-  void commit();
-  /// Ends without a result. If there is no earlier result, the keyframes so far stay in `path`.
+  void commit(bool is_whole = true);
+  /// Ends without a result. The keyframes so far stay in `path`.
   /// @return what stays where, to add to an error; may be empty.
   std::string abandon();
 
@@ -92,16 +109,31 @@ class ResultFolder {
   };
 
  private:
-  struct Lock {
-    int file = -1;
+  /// The locked file run.lock. A thread touches it.
+  class Lock {
+   public:
     Lock() = default;
-    ~Lock();
+    ~Lock() { release(); }
     Lock(const Lock&) = delete;
     Lock& operator=(const Lock&) = delete;
+
+    /// @param path its first word is `kind`. @return false if another run has it.
+    bool take(const std::filesystem::path& path, const std::string& kind);
+    void release();
+
+   private:
+    int file_ = -1;
+    std::string kind_;
+    std::mutex mutex_;
+    std::condition_variable ends_;
+    bool ending_ = false;
+    std::thread thread_;
   };
 
   void lock();
-  void replace();
+  void setAside();
+  void takeStored(const std::filesystem::path& from);
+  void replace(bool is_whole);
   bool exchange();
 
   std::filesystem::path out_;
@@ -110,6 +142,7 @@ class ResultFolder {
   std::filesystem::path left_;
   Lock lock_;
   bool stays_ = false;
+  bool replaces_ = false;  ///< `commit` was called.
 };
 
 /// Makes a folder and those above it. @throws std::runtime_error naming the folder.

@@ -102,7 +102,7 @@ std::set<std::string> filesOf(const std::string& text) {
       {"MAP",
        {"keyframes/*/confidence.png", "keyframes/*/confidence.tiff", "keyframes/*/depth.png",
         "keyframes/*/depth.tiff", "keyframes/*/probability.tiff", "map.html", "map.pcd", "map.png",
-        "map.simplemap", "overview.png", "report.json", "trajectory.txt"}},
+        "map.simplemap", "overview.png", "report.json", "session.mcap", "trajectory.txt"}},
       {"KEYFRAME",
        {"confidence.png", "confidence.tiff", "depth.png", "depth.tiff", "points.pcd",
         "probability.tiff", "report.json"}}};

@@ -285,7 +285,7 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
   }
   char byte = 0;
   ASSERT_EQ(read(ready[0], &byte, 1), 1);
-  const std::string at_work = out.string() + ": another run is writing its result there";
+  const std::string at_work = out.string() + ": process " + std::to_string(other) + " on ";
   const auto require = [&] { ResultFolder::require(out, OutputKind::kMap, true); };
   EXPECT_THAT(messageOf(require), HasSubstr(at_work));
   EXPECT_THAT(messageOf([&] { ResultFolder result(out, OutputKind::kMap); }), HasSubstr(at_work));
@@ -295,15 +295,17 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
 
   require();
   const fs::path left = folder() / "out.left";
-  for (const std::uint64_t keyframes : {2U, 3U}) {
+  int next = 0;
+  for (const std::uint64_t keyframes : {2U, 2U, 3U}) {
     ResultFolder result(out, OutputKind::kMap);
     EXPECT_EQ(result.left(), left);
-    EXPECT_EQ(countKeyframes(left), keyframes) << "of all that were killed";
+    EXPECT_EQ(countKeyframes(left), keyframes) << "of the killed run that made the most";
     write(result.path(), {{"keyframes/7.000000000/depth.tiff", ""}});
+    if (next++ > 0) write(result.path(), resultOf("third"));
     result.abandon();
     for (const fs::path& same : {out, result.path()}) {
       EXPECT_THAT(messageOf([&] { ResultFolder second(same, OutputKind::kMap); }),
-                  HasSubstr("another run is writing its result there"));
+                  HasSubstr(" is writing its result there"));
     }
   }
   EXPECT_TRUE(fs::exists(left)) << "that run made no result";
@@ -355,10 +357,65 @@ TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
   {
     ResultFolder result(out, OutputKind::kMap);
     write(result.path(), keyframe);
-    EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() + " stays");
+    EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() +
+                                    " stays; the keyframes before it (1) are in " + out.string() +
+                                    ".partial");
   }
-  EXPECT_EQ(filesBelow(folder()).size(), resultOf("old").size()) << "the disk may be full";
+  EXPECT_EQ(filesBelow(folder() / "out.partial").count("keyframes/1.000000000/depth.tiff"), 1U);
   EXPECT_EQ(filesBelow(out), resultOf("old"));
+}
+
+TEST_F(ResultFolderTest, TheLockOfAnotherHostCountsForAMinute) {
+  const fs::path out = folder() / "out";
+  const fs::path lock = folder() / "out.partial" / "run.lock";
+  const auto require = [&] {
+    return messageOf([&] { ResultFolder::require(out, OutputKind::kMap, false); });
+  };
+  const auto touched = [&](int seconds_ago) {
+    fs::last_write_time(lock, fs::file_time_type::clock::now() - std::chrono::seconds(seconds_ago));
+  };
+  writeFile(lock, "map 4711 another-host\n");
+  EXPECT_THAT(require(),
+              HasSubstr("out: process 4711 on another-host is writing its result there (" +
+                        lock.string() + ")"));
+  touched(50);
+  EXPECT_THAT(require(), HasSubstr("process 4711 on another-host"));
+  touched(70);
+  EXPECT_EQ(require(), "no error");
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  writeFile(lock, "map 4711 " + std::string(host.data()) + "\n");
+  EXPECT_EQ(require(), "no error") << "without its lock it has ended";
+  { const ResultFolder result(out, OutputKind::kMap); }
+  EXPECT_TRUE(fs::is_empty(folder()));
+}
+
+TEST_F(ResultFolderTest, ARunGoesOnWithTheFilesOfAnEarlierOne) {
+  const fs::path out = folder() / "out";
+  Files stored = resultOf("earlier");
+  stored["session.mcap"] = "the session";
+  constexpr std::uint64_t kStored = 2;
+  const auto inPartial = [&](const fs::path& from) {
+    const ResultFolder result(out, OutputKind::kMap, from);
+    EXPECT_EQ(readText(result.path() / "session.mcap"), "the session") << from;
+    EXPECT_EQ(countKeyframes(result.path()), kStored) << from;
+  };
+  const std::vector<fs::path> places = ResultFolder::storedIn(out);
+  EXPECT_EQ(places,
+            (std::vector<fs::path>{out, out.string() + ".partial", out.string() + ".left"}));
+  const fs::path& partial = places[1];
+  for (const fs::path& place : {partial, places[2], out}) {
+    write(place, stored);
+    if (place != out) writeFile(place / "run.lock", "map");
+    inPartial(place);
+    EXPECT_EQ(countKeyframes(partial), kStored) << "a run that ends early keeps them";
+    EXPECT_TRUE(fs::exists(partial / "session.mcap"));
+    EXPECT_FALSE(fs::exists(places[2]));
+    if (place == out) {
+      EXPECT_EQ(filesBelow(out), stored) << "the result stays";
+    }
+    fs::remove_all(partial);
+  }
 }
 
 TEST_F(ResultFolderTest, FoldersThatAreNotForAResultAreNamed) {

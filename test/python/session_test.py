@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Session files, read by the package and by a reader that knows only the specifications of MCAP, CDR and ROS 2."""
+
+import hashlib
+import os
+import struct
+import subprocess
+import zlib
+
+import numpy as np
+import pytest
+import zstandard
+
+import event_fusion as ef
+
+DESK = os.path.join(os.environ["EFM_RECORDINGS"], "desk_stereo")
+OPTIONS = {"dsi.min_depth_m": 0.5, "dsi.max_depth_m": 5, "keyframes.stride_s": 0.5, "refinement.enabled": True}
+
+
+class Fields:
+    """Takes the fields of an MCAP record."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def number(self, code):
+        (value,) = struct.unpack_from("<" + code, self.data, self.at)
+        self.at += struct.calcsize("<" + code)
+        return value
+
+    def text(self):
+        size = self.number("I")
+        self.at += size
+        return self.data[self.at - size : self.at].decode()
+
+
+def records(data):
+    at = 0
+    while at < len(data):
+        op, size = data[at], struct.unpack_from("<Q", data, at + 1)[0]
+        yield op, data[at + 9 : at + 9 + size]
+        at += 9 + size
+
+
+def read_mcap(path):
+    """Return (topic, type, definition, message) of each message, and the statistics; checks the checksums."""
+    with open(path, "rb") as file:
+        data = file.read()
+    assert data[:8] == data[-8:] == b"\x89MCAP0\r\n"
+    schemas, channels, messages, statistics, chunks = {}, {}, [], None, 0
+
+    def take(op, content):
+        nonlocal statistics, chunks
+        fields = Fields(content)
+        if op == 3:
+            key, name, encoding = fields.number("H"), fields.text(), fields.text()
+            assert encoding == "ros2msg"
+            schemas[key] = name, fields.text()
+        elif op == 4:
+            key, schema, topic, encoding = fields.number("H"), fields.number("H"), fields.text(), fields.text()
+            assert encoding == "cdr"
+            channels[key] = topic, *schemas[schema]
+        elif op == 5:
+            channel, sequence, _, _ = (fields.number(code) for code in "HIQQ")
+            messages.append((*channels[channel], content[fields.at :], sequence))
+        elif op == 6:
+            chunks += 1
+            _, _, size, checksum = (fields.number(code) for code in "QQQI")
+            assert fields.text() == "zstd"
+            packed = content[fields.at + 8 : fields.at + 8 + fields.number("Q")]
+            unpacked = zstandard.ZstdDecompressor().decompress(packed, size)
+            assert len(unpacked) == size and zlib.crc32(unpacked) == checksum
+            for inner in records(unpacked):
+                take(*inner)
+        elif op == 11:
+            statistics = [fields.number(code) for code in "QHIIII"]
+
+    for op, content in records(data[8:-8]):
+        take(op, content)
+    summary_at, _, checksum = struct.unpack("<QQI", data[-28:-8])
+    assert zlib.crc32(data[summary_at:-12]) == checksum
+    return messages, statistics, chunks
+
+
+class Cdr(Fields):
+    """Takes the values of a message, aligned to their sizes behind the header of four bytes."""
+
+    def __init__(self, data):
+        super().__init__(data[4:])
+
+    def number(self, code):
+        self.at += -self.at % struct.calcsize("<" + code)
+        return super().number(code)
+
+    def text(self):
+        return super().text()[:-1]
+
+    def value(self, type_name):
+        """Return a value of a ROS 2 type: a number, a text, or an array."""
+        codes = {"uint8": "B", "float32": "f", "float64": "d", "int32": "i", "int64": "q", "uint16": "H", "uint32": "I", "uint64": "Q"}
+        if type_name == "string":
+            return self.text()
+        name, _, size = type_name.partition("[")
+        if not size:
+            return self.number(codes[name])
+        count = int(size[:-1]) if size != "]" else self.number("I")
+        if count:
+            self.at += -self.at % struct.calcsize("<" + codes[name])
+        array = np.frombuffer(self.data, "<" + np.dtype(name).str[1:], count, self.at)
+        self.at += array.nbytes
+        return array
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    out = tmp_path_factory.mktemp("session") / "out"
+    return ef.map(DESK, OPTIONS, out=out), out
+
+
+def test_an_independent_reader_finds_the_keyframes(result):
+    made, out = result
+    keyframes = made.keyframes
+    messages, statistics, chunks = read_mcap(out / "session.mcap")
+    assert statistics[0] == len(messages) and statistics[-1] == chunks == len(keyframes) + 3  # run, poses, report
+    of = {topic: [(definition, Cdr(data)) for name, _, definition, data, _ in messages if name == topic] for topic, *_ in messages}
+    assert len(of["/efm/run"]) == len(of["/efm/poses"]) == len(of["/efm/report"]) == 1
+    for number, keyframe in enumerate(keyframes):
+        definition, message = of["/efm/keyframe"][number]
+        stored = {}
+        for line in definition.splitlines():
+            type_name, name = line.split("#")[0].split()
+            stored[name] = message.value(type_name)
+        assert message.at == len(message.data), "the schema describes the whole message"
+        v, u = np.nonzero(keyframe.depth)
+        assert (stored["t_ref_ns"], stored["t0_ns"], stored["t1_ns"]) == (keyframe.t, *keyframe.window)
+        assert np.array_equal(stored["v"], v) and np.array_equal(stored["u"], u)
+        for name, image in (("depth_m", keyframe.depth), ("confidence", keyframe.confidence), ("probability", keyframe.probability)):
+            assert np.array_equal(stored[name], image[v, u], equal_nan=True), name
+
+        _, cloud = of["/efm/points"][number]
+        stamp = cloud.number("i"), cloud.number("I")
+        assert stamp[0] * 10**9 + stamp[1] == keyframe.t and cloud.text() == "keyframe"
+        assert (cloud.number("I"), cloud.number("I")) == (1, len(u))
+        fields = [(cloud.text(), cloud.number("I"), cloud.number("B"), cloud.number("I")) for _ in range(cloud.number("I"))]
+        assert [field[0] for field in fields] == ["x", "y", "z", "intensity", "sigma_m"]
+        assert cloud.number("B") == 0 and cloud.number("I") == 20 and cloud.number("I") == 20 * len(u)
+        points = np.frombuffer(cloud.data, "<f4", cloud.number("I") // 4, cloud.at).reshape(-1, 5)
+        assert np.array_equal(points[:, 2], keyframe.depth[v, u]) and np.array_equal(points[:, 3], keyframe.confidence[v, u])
+        in_world = np.c_[points[:, :3], np.ones(len(points))] @ keyframe.pose.T
+        assert np.allclose(in_world[:, :3], keyframe.points(), atol=1e-5)  # float32 against float64
+
+
+def test_a_session_gives_what_the_map_was_made_from(result):
+    made, out = result
+    session = ef.Session(out)
+    assert len(session) == len(made.keyframes)
+    assert session.damage == ""
+    assert session.report == made.report and session.report["map_hash"] == made.hash
+    for one, other in zip(session.keyframes, made.keyframes):
+        assert np.array_equal(one.depth, other.depth) and one.t == other.t and np.array_equal(one.pose, other.pose)
+    assert np.array_equal(session.poses()[1], made.trajectory[1])
+    assert np.array_equal(session.poses(refined=False)[1], made.tracker_trajectory[1])
+    assert session.run["options"] == made.report["options"] and session.run["given"]["dsi"]["max_depth_m"] == 5
+    assert "7 keyframes" in repr(session) or f"{len(session)} keyframes" in repr(session)
+    with pytest.raises(IndexError):
+        session.keyframe(len(session))
+    with pytest.raises(OSError, match="no session file|cannot read"):
+        ef.Session(out / "map.pcd")
+
+
+def test_the_hash_is_that_of_the_sorted_points(result):
+    made, _ = result
+    points = made.points
+    names = ("x", "y", "z", "intensity", "sigma", "probability", "support")
+    rows = np.stack([points[name].astype("<f8") for name in names], axis=1)
+    rows = np.where(np.isnan(rows), -1, rows)
+    rows = rows[np.lexsort(rows.T[::-1])]
+    assert hashlib.sha256(rows.tobytes()).hexdigest() == made.hash
+
+
+def test_a_complete_map_is_not_changed_and_given_again(result):
+    made, out = result
+    before = {file: os.stat(out / file).st_mtime_ns for file in os.listdir(out)}
+    again = ef.map(DESK, OPTIONS, out=out, resume=True)
+    assert again.hash == made.hash and again.report == made.report
+    assert np.array_equal(again.trajectory[1], made.trajectory[1])
+    assert len(again.keyframes) == len(made.keyframes)
+    assert {file: os.stat(out / file).st_mtime_ns for file in os.listdir(out)} == before
+    with pytest.raises(OSError, match=r"dsi.max_depth_m was 5(\.0)?, now 6"):
+        ef.map(DESK, {**OPTIONS, "dsi.max_depth_m": 6}, out=out, resume=True).report
+    with pytest.raises(ValueError, match="resume=True: expected out="):
+        ef.map(DESK, OPTIONS, resume=True)
+
+
+def test_mapper_writes_a_session(tmp_path):
+    file = tmp_path / "live.mcap"
+    desk = ef.open(DESK)
+    for round_number in range(2):
+        mapper = ef.Mapper({**OPTIONS, "output.session_file": file, "rig.calibration": DESK + "/camchain.yaml"})
+        mapper.add_recording(desk)
+        mapper.finish()
+        session = ef.Session(file)
+        assert len(session) == mapper.status["counts"]["keyframes"] if "counts" in mapper.status else len(session) > 0
+        assert session.report["map_hash"] == mapper.hash
+    assert sorted(os.listdir(tmp_path)) == ["live.mcap", "live.mcap.1"]
+    with pytest.raises(OSError, match="there is no folder"):
+        ef.Mapper({"output.session_file": tmp_path / "missing" / "a.mcap"})
+
+
+def test_program_and_module_have_the_same_hash(result, tmp_path):
+    made, _ = result
+    words = [os.environ["EFM_EVENT_FUSION"], "map", DESK, "--out", str(tmp_path / "out")]
+    words += [f"--set={key}={str(value).lower()}" for key, value in OPTIONS.items()]
+    text = subprocess.run([*words, "--set=performance.threads=1"], check=True, capture_output=True, text=True).stdout
+    assert f"hash        {made.hash}\n" in text
