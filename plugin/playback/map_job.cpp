@@ -262,6 +262,20 @@ void findStored(Job& job) {
   }
 }
 
+/// Warns if the stored keyframes are of a kernel that rounds in another way.
+void warnOfKernels(Job& job) {
+  const auto kernelOf = [](const nlohmann::ordered_json& run) {
+    const std::string kernel = run.value("kernel", std::string());
+    return kernel == "avx512" ? "avx2" : kernel;  // they agree bit for bit
+  };
+  const std::string before = kernelOf(job.stored->session->run()), now = kernelOf(job.run);
+  if (before == now) return;
+  addWarning(job.report.warnings, "mixed-kernels",
+             "the first {} keyframes are by the kernel {}, the others by {}: they agree up to "
+             "rounding (--set performance.kernel={} goes on exactly)",
+             job.stored->keyframes(), before, now, before);
+}
+
 /// Passes over the recording for max_confidence = sequence: the robust maximum of the keyframes'
 /// confidences. It costs as much as the mapping. @return std::nullopt if there is no keyframe.
 std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
@@ -301,6 +315,7 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   if (has_session) addChosen(job.run, look.recording->rig(), job.options, look.first.chosen);
   if (job.stored) {
     requireSameChoice(*job.stored, job.run);
+    warnOfKernels(job);
     keyframe.made_earlier = storedKeyframes(job.stored->session, job.stored->keyframes());
     if (job.stored->is_complete) return look;
   }

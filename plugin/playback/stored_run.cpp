@@ -141,8 +141,10 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
     return best;
   }
   findUsable(*best);
-  notes.push_back(fmt::format("goes on after the {} keyframes in {}", best->names.size(),
-                              best->session->path().string()));
+  const std::string& damage = best->session->damage();
+  notes.push_back(fmt::format("goes on after the {} keyframes in {}{}", best->names.size(),
+                              best->session->path().string(),
+                              damage.empty() ? "" : " (" + damage + ")"));
   return best;
 }
 

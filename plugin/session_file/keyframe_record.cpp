@@ -17,112 +17,168 @@
 namespace efm {
 namespace {
 
-/// The fields of /efm/keyframe: numbers, texts and lists of numbers. A list of a value that may be
-/// unknown has no element or one.
-struct KeyframeRecord {
-  std::int64_t t0_ns = 0, t1_ns = 0, t_ref_ns = 0;
-  std::array<double, 7> T_world_ref{}, T_odom_ref{}, T_rig_ref{};
-  std::uint32_t width = 0, height = 0;
-  std::array<double, 4> intrinsics{};
-  double min_depth_m = 0, max_depth_m = 0;
-  std::uint32_t num_planes = 0;
-  std::string spacing;
-  double parallax_px_m = 0, max_confidence = 0;
-  double knot_spacing_s = 0;
-  std::uint32_t reference_knot = 0;
-  std::vector<double> knots, expected_walk;
-  std::vector<double> blur_px;
-  double sharpness_gain = 1;
-  std::vector<double> watched_blurs;
-  std::int32_t since_look = 0;
-  std::vector<double> pose_noise;
-  std::uint8_t after_stop = 0;
-  std::vector<std::uint64_t> events;
-  std::uint64_t without_pose = 0, outside_lens = 0, over_budget = 0;
-  std::array<std::uint64_t, 4> votes{};
-  std::vector<std::int32_t> silent_cameras;
-  std::uint64_t silent_subintervals = 0;
-  std::array<std::uint64_t, 5> pixels{};
+/// The points of a keyframe's depth maps and its events, as lists.
+struct Lists {
   std::vector<std::int32_t> map_camera;
   std::vector<std::uint32_t> map_points;
   std::vector<std::uint16_t> u, v;
   std::vector<float> depth_m, confidence, variance, probability;
-  std::uint8_t has_events = 0;
+  bool has_events = false;
   std::vector<std::uint16_t> event_u, event_v, negative_events, positive_events;
-
-  template <typename Self, typename Visit>
-  static void fields(Self& self, Visit&& visit) {
-    visit("t0_ns", self.t0_ns, "the window is [t0, t1)");
-    visit("t1_ns", self.t1_ns);
-    visit("t_ref_ns", self.t_ref_ns, "time of the poses");
-    visit("t_world_ref", self.T_world_ref, "x y z qx qy qz qw: p_world = T_world_ref * p_ref");
-    visit("t_odom_ref", self.T_odom_ref, "by the tracker; T_world_ref may be refined");
-    visit("t_rig_ref", self.T_rig_ref);
-    visit("width", self.width, "of the view, pixels");
-    visit("height", self.height);
-    visit("intrinsics", self.intrinsics, "fx fy cx cy, pixels");
-    visit("min_depth_m", self.min_depth_m, "of the depth planes");
-    visit("max_depth_m", self.max_depth_m);
-    visit("num_planes", self.num_planes);
-    visit("spacing", self.spacing, "inverse or linear");
-    visit("parallax_px_m", self.parallax_px_m, "pixels per 1/m");
-    visit("max_confidence", self.max_confidence);
-    visit("knot_spacing_s", self.knot_spacing_s, "correction of the motion in the window");
-    visit("reference_knot", self.reference_knot);
-    visit("knots", self.knots, "six each: metres, then a rotation vector; none: no correction");
-    visit("expected_walk", self.expected_walk, "m and rad per root of a second");
-    visit("blur_px", self.blur_px, "by the poses; none: not known");
-    visit("sharpness_gain", self.sharpness_gain, "by the correction");
-    visit("watched_blurs", self.watched_blurs, "of earlier windows, the newest first");
-    visit("since_look", self.since_look, "windows since the last of them");
-    visit("pose_noise", self.pose_noise, "stated by the tracker: m, rad; none: not stated");
-    visit("after_stop", self.after_stop, "1: made after the run was stopped");
-    visit("events", self.events, "that voted, per camera");
-    visit("without_pose", self.without_pose);
-    visit("outside_lens", self.outside_lens);
-    visit("over_budget", self.over_budget);
-    visit("votes", self.votes, "cast, interpolated, outside the view, behind the camera");
-    visit("silent_cameras", self.silent_cameras);
-    visit("silent_subintervals", self.silent_subintervals);
-    visit("pixels", self.pixels, "candidates, nearest, farthest, ambiguous, neighbours");
-    visit("map_camera", self.map_camera, "of each depth map; -1: all cameras fused");
-    visit("map_points", self.map_points, "number of points of each depth map");
-    visit("u", self.u, "column of each point, one depth map after the other");
-    visit("v", self.v, "row");
-    visit("depth_m", self.depth_m, "along the view's z axis");
-    visit("confidence", self.confidence);
-    visit("variance", self.variance, "of inverse depth, 1/m^2");
-    visit("probability", self.probability, "that the depth is within 10 %; none: not known");
-    visit("has_events", self.has_events, "1: the events for pictures are known");
-    visit("event_u", self.event_u, "pixels with events of the reference camera near t_ref");
-    visit("event_v", self.event_v);
-    visit("negative_events", self.negative_events);
-    visit("positive_events", self.positive_events);
-  }
 };
+
+/// Calls `visit` with the name, the value and an explanation of each field of /efm/keyframe: the
+/// schema, the writer and the reader.
+template <typename Keyframe, typename ListsOf, typename Visit>
+void visitFields(Keyframe& keyframe, ListsOf& lists, Visit&& visit) {
+  visit("t0_ns", keyframe.window.t0_ns, "the window is [t0, t1)");
+  visit("t1_ns", keyframe.window.t1_ns);
+  visit("t_ref_ns", keyframe.window.t_ref_ns, "time of the poses");
+  visit("t_world_ref", keyframe.T_world_ref, "x y z qx qy qz qw: p_world = T_world_ref * p_ref");
+  visit("t_odom_ref", keyframe.T_odom_ref, "by the tracker; T_world_ref may be refined");
+  visit("t_rig_ref", keyframe.T_rig_ref);
+  visit("width", keyframe.view.width, "of the view, pixels");
+  visit("height", keyframe.view.height);
+  visit("fx", keyframe.view.fx);
+  visit("fy", keyframe.view.fy);
+  visit("cx", keyframe.view.cx);
+  visit("cy", keyframe.view.cy);
+  visit("min_depth_m", keyframe.planes.min_depth_m, "of the depth planes");
+  visit("max_depth_m", keyframe.planes.max_depth_m);
+  visit("num_planes", keyframe.planes.num_planes);
+  visit("spacing", keyframe.planes.spacing, "inverse or linear");
+  visit("parallax_px_m", keyframe.parallax_px_m, "pixels per 1/m");
+  visit("max_confidence", keyframe.max_confidence);
+  visit(
+      "motion_correction", keyframe.motion_correction,
+      "none, or: seconds between knots, number of the knot at t_ref, expected walk (m and rad per "
+      "root of a second), then six numbers per knot: metres, rotation vector");
+  visit("blur_px", keyframe.blur_px, "by the poses; none: not known");
+  visit("sharpness_gain", keyframe.sharpness_gain, "by the correction");
+  visit("watched_blurs", keyframe.blur_watch.last_px, "of earlier windows, the newest first");
+  visit("since_look", keyframe.blur_watch.since_look, "windows since the last of them");
+  visit("pose_noise", keyframe.pose_noise, "stated by the tracker: m, rad; none: not stated");
+  visit("after_stop", keyframe.after_stop, "1: made after the run was stopped");
+  visit("events", keyframe.events, "that voted, per camera");
+  visit("without_pose", keyframe.without_pose);
+  visit("outside_lens", keyframe.outside_lens);
+  visit("over_budget", keyframe.over_budget);
+  visit("votes_cast", keyframe.votes.cast);
+  visit("votes_interpolated", keyframe.votes.interpolated);
+  visit("votes_outside_view", keyframe.votes.outside_view);
+  visit("votes_behind_camera", keyframe.votes.behind_camera);
+  visit("silent_cameras", keyframe.silent_cameras);
+  visit("silent_subintervals", keyframe.silent_subintervals);
+  visit("candidates", keyframe.map.pixels.candidates, "pixels with contrast");
+  visit("at_nearest", keyframe.map.pixels.at_nearest, "of them");
+  visit("at_farthest", keyframe.map.pixels.at_farthest);
+  visit("ambiguous", keyframe.map.pixels.ambiguous);
+  visit("neighbours", keyframe.map.pixels.neighbours, "pixels with a depth beside them");
+  visit("map_camera", lists.map_camera, "of each depth map; -1: all cameras fused");
+  visit("map_points", lists.map_points, "number of points of each depth map");
+  visit("u", lists.u, "column of each point, one depth map after the other");
+  visit("v", lists.v, "row");
+  visit("depth_m", lists.depth_m, "along the view's z axis");
+  visit("confidence", lists.confidence);
+  visit("variance", lists.variance, "of inverse depth, 1/m^2");
+  visit("probability", lists.probability, "that the depth is within 10 %; none: not known");
+  visit("has_events", lists.has_events, "1: the events for pictures are known");
+  visit("event_u", lists.event_u, "pixels with events of the reference camera near t_ref");
+  visit("event_v", lists.event_v);
+  visit("negative_events", lists.negative_events);
+  visit("positive_events", lists.positive_events);
+}
+
+// A field is a number, a text or a list of numbers. Other types are lists of numbers: `numbersIn`
+// and `setNumbers`.
+
+using Numbers = std::vector<double>;
+
+Numbers numbersIn(const Rigid3& T) {
+  const Eigen::Vector3d& p = T.translation;
+  const Eigen::Quaterniond& q = T.rotation;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+bool setNumbers(const Numbers& numbers, Rigid3& T) {
+  if (numbers.size() != 7) return false;
+  T = {Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]),
+       {numbers[0], numbers[1], numbers[2]}};
+  return true;
+}
+
+Numbers numbersIn(const std::optional<double>& value) {
+  return value ? Numbers{*value} : Numbers();
+}
+bool setNumbers(const Numbers& numbers, std::optional<double>& value) {
+  if (!numbers.empty()) value = numbers.front();
+  return numbers.size() < 2;
+}
+
+Numbers numbersIn(const std::optional<PoseNoise>& noise) {
+  return noise ? Numbers{noise->noise_m, noise->noise_rad} : Numbers();
+}
+bool setNumbers(const Numbers& numbers, std::optional<PoseNoise>& noise) {
+  if (numbers.size() == 2) noise = PoseNoise{numbers[0], numbers[1]};
+  return numbers.size() == 2 || numbers.empty();
+}
+
+Numbers numbersIn(const std::optional<MotionCorrection>& correction) {
+  if (!correction) return {};
+  Numbers numbers = {correction->spacing_s, static_cast<double>(correction->reference),
+                     correction->walk_m, correction->walk_rad};
+  for (const Vector6d& knot : correction->knots) {
+    numbers.insert(numbers.end(), knot.data(), knot.data() + knot.size());
+  }
+  return numbers;
+}
+bool setNumbers(const Numbers& numbers, std::optional<MotionCorrection>& correction) {
+  constexpr std::size_t kHead = 4, kKnot = 6;
+  if (numbers.empty()) return true;
+  if (numbers.size() % kKnot != kHead || !(numbers[1] >= 0 && numbers[1] < 1e9)) return false;
+  MotionCorrection& made = correction.emplace();
+  made.spacing_s = numbers[0];
+  made.reference = static_cast<std::size_t>(numbers[1]);
+  made.walk_m = numbers[2];
+  made.walk_rad = numbers[3];
+  for (std::size_t i = kHead; i < numbers.size(); i += kKnot) {
+    made.knots.emplace_back(Vector6d::Map(numbers.data() + i));
+  }
+  return true;
+}
 
 template <typename Field>
 struct ListOf : std::false_type {};
 template <typename Number>
 struct ListOf<std::vector<Number>> : std::true_type {};
-template <typename Field>
-struct ArrayOf : std::false_type {};
-template <typename Number, std::size_t Size>
-struct ArrayOf<std::array<Number, Size>> : std::true_type {};
 
 template <typename Field>
 std::string typeName() {
-  if constexpr (std::is_same_v<Field, std::string>) {
+  if constexpr (std::is_enum_v<Field>) {
     return "string";
-  } else if constexpr (ListOf<Field>::value) {
-    return typeName<typename Field::value_type>() + "[]";
-  } else if constexpr (ArrayOf<Field>::value) {
-    return fmt::format("{}[{}]", typeName<typename Field::value_type>(), std::tuple_size_v<Field>);
-  } else {
+  } else if constexpr (std::is_same_v<Field, bool>) {
+    return "uint8";
+  } else if constexpr (std::is_arithmetic_v<Field>) {
     const char* kind = std::is_floating_point_v<Field> ? "float"
                        : std::is_signed_v<Field>       ? "int"
                                                        : "uint";
     return fmt::format("{}{}", kind, 8 * sizeof(Field));
+  } else if constexpr (ListOf<Field>::value) {
+    return typeName<typename Field::value_type>() + "[]";
+  } else {
+    return "float64[]";
+  }
+}
+
+template <typename Field>
+void add(CdrWriter& message, const Field& field) {
+  if constexpr (std::is_enum_v<Field>) {
+    message.add(nameOf(field));
+  } else if constexpr (std::is_same_v<Field, bool>) {
+    message.add(static_cast<std::uint8_t>(field));
+  } else if constexpr (std::is_arithmetic_v<Field> || ListOf<Field>::value) {
+    message.add(field);
+  } else {
+    message.add(numbersIn(field));
   }
 }
 
@@ -140,112 +196,118 @@ std::string takeText(ByteReader& body) {
 
 template <typename Field>
 void take(ByteReader& body, Field& field) {
-  if constexpr (std::is_same_v<Field, std::string>) {
-    field = takeText(body);
+  if constexpr (std::is_enum_v<Field>) {
+    field = fromName<Field>(takeText(body));
+  } else if constexpr (std::is_same_v<Field, bool>) {
+    field = body.number<std::uint8_t>() != 0;
   } else if constexpr (std::is_arithmetic_v<Field>) {
     field = body.number<Field>();
+  } else if constexpr (ListOf<Field>::value) {
+    using Number = typename Field::value_type;
+    const auto size = body.number<std::uint32_t>();
+    const std::size_t most = body.remaining() / sizeof(Number);
+    if (size > most) throw std::runtime_error(fmt::format("{} numbers: at most {}", size, most));
+    field.resize(size);
+    for (Number& number : field) number = body.number<Number>();
   } else {
-    if constexpr (ListOf<Field>::value) {
-      using Number = typename Field::value_type;
-      const auto size = body.number<std::uint32_t>();
-      if (size > body.remaining() / sizeof(Number)) {
-        throw std::runtime_error(fmt::format("{} numbers: expected at most {}", size,
-                                             body.remaining() / sizeof(Number)));
-      }
-      field.resize(size);
+    Numbers numbers;
+    take(body, numbers);
+    if (!setNumbers(numbers, field)) {
+      throw std::runtime_error(fmt::format("{} numbers: another count", numbers.size()));
     }
-    for (auto& number : field) number = body.number<std::decay_t<decltype(number)>>();
   }
 }
 
-std::array<double, 7> numbersOf(const Rigid3& T) {
-  const Eigen::Vector3d& p = T.translation;
-  const Eigen::Quaterniond& q = T.rotation;
-  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-}
-
-Rigid3 rigidOf(const std::array<double, 7>& n) {
-  return {Eigen::Quaterniond(n[6], n[3], n[4], n[5]), {n[0], n[1], n[2]}};
-}
-
-void addMap(int camera, const DepthMap& map, KeyframeRecord& record) {
-  const std::size_t before = record.u.size();
+void addMap(int camera, const DepthMap& map, Lists& lists) {
+  const std::size_t before = lists.u.size();
   for (int y = 0; y < map.depth.rows; ++y) {
     for (int x = 0; x < map.depth.cols; ++x) {
       if (!(map.depth(y, x) > 0)) continue;
-      record.u.push_back(static_cast<std::uint16_t>(x));
-      record.v.push_back(static_cast<std::uint16_t>(y));
-      record.depth_m.push_back(map.depth(y, x));
-      record.confidence.push_back(map.confidence(y, x));
-      record.variance.push_back(map.variance(y, x));
-      if (!map.probability.empty()) record.probability.push_back(map.probability(y, x));
+      lists.u.push_back(static_cast<std::uint16_t>(x));
+      lists.v.push_back(static_cast<std::uint16_t>(y));
+      lists.depth_m.push_back(map.depth(y, x));
+      lists.confidence.push_back(map.confidence(y, x));
+      lists.variance.push_back(map.variance(y, x));
+      if (!map.probability.empty()) lists.probability.push_back(map.probability(y, x));
     }
   }
-  record.map_camera.push_back(camera);
-  record.map_points.push_back(static_cast<std::uint32_t>(record.u.size() - before));
+  lists.map_camera.push_back(camera);
+  lists.map_points.push_back(static_cast<std::uint32_t>(lists.u.size() - before));
 }
 
-DepthMap mapOf(const KeyframeRecord& record, std::size_t begin, std::size_t end) {
+void addEvents(const cv::Mat_<cv::Vec2i>& events, Lists& lists) {
+  const auto count = [](int number) {
+    return static_cast<std::uint16_t>(
+        std::min<int>(number, std::numeric_limits<std::uint16_t>::max()));
+  };
+  lists.has_events = !events.empty();
+  for (int y = 0; y < events.rows; ++y) {
+    for (int x = 0; x < events.cols; ++x) {
+      const cv::Vec2i& here = events(y, x);
+      if (here == cv::Vec2i()) continue;
+      lists.event_u.push_back(static_cast<std::uint16_t>(x));
+      lists.event_v.push_back(static_cast<std::uint16_t>(y));
+      lists.negative_events.push_back(count(here[0]));
+      lists.positive_events.push_back(count(here[1]));
+    }
+  }
+}
+
+/// @throws std::runtime_error if lists that belong together differ, or a pixel is outside the view.
+void requireAgreement(const ReferenceView& view, const Lists& lists) {
+  std::size_t points = 0;
+  for (const std::uint32_t count : lists.map_points) points += count;
+  const auto have = [](std::size_t count, const auto&... all) {
+    return ((all.size() == count) && ...);
+  };
+  const auto below = [](int end, const std::vector<std::uint16_t>& all) {
+    return all.empty() || *std::max_element(all.begin(), all.end()) < end;
+  };
+  constexpr int kMaxSide = std::numeric_limits<std::uint16_t>::max();
+  const bool agree =
+      view.width > 0 && view.width <= kMaxSide && view.height > 0 && view.height <= kMaxSide &&
+      !lists.map_points.empty() && have(lists.map_points.size(), lists.map_camera) &&
+      have(points, lists.u, lists.v, lists.depth_m, lists.confidence, lists.variance) &&
+      (lists.probability.empty() || have(points, lists.probability)) &&
+      have(lists.event_u.size(), lists.event_v, lists.negative_events, lists.positive_events) &&
+      below(view.width, lists.u) && below(view.height, lists.v) &&
+      below(view.width, lists.event_u) && below(view.height, lists.event_v);
+  if (!agree) throw std::runtime_error("its lists do not belong together");
+}
+
+/// Returns the depth map of the points [begin, end).
+DepthMap mapOf(cv::Size size, const Lists& lists, std::size_t begin, std::size_t end) {
   DepthMap map;
-  const cv::Size size(static_cast<int>(record.width), static_cast<int>(record.height));
-  const bool has_probability = !record.probability.empty() || record.u.empty();
+  const bool has_probability = !lists.probability.empty() || lists.u.empty();
   for (cv::Mat1f* image : {&map.depth, &map.confidence, &map.variance, &map.probability}) {
     if (image != &map.probability || has_probability) *image = cv::Mat1f::zeros(size);
   }
   for (std::size_t i = begin; i < end; ++i) {
-    const cv::Point pixel(record.u[i], record.v[i]);
-    if (pixel.x >= size.width || pixel.y >= size.height) {
-      throw std::runtime_error(fmt::format("a point at pixel ({}, {}): expected it in {} x {}",
-                                           pixel.x, pixel.y, size.width, size.height));
-    }
-    map.depth(pixel) = record.depth_m[i];
-    map.confidence(pixel) = record.confidence[i];
-    map.variance(pixel) = record.variance[i];
-    if (has_probability) map.probability(pixel) = record.probability[i];
+    const cv::Point pixel(lists.u[i], lists.v[i]);
+    map.depth(pixel) = lists.depth_m[i];
+    map.confidence(pixel) = lists.confidence[i];
+    map.variance(pixel) = lists.variance[i];
+    if (has_probability) map.probability(pixel) = lists.probability[i];
   }
   return map;
 }
 
-/// @throws std::runtime_error if lists that belong together differ in length.
-void requireAgreement(const KeyframeRecord& record) {
-  std::size_t points = 0;
-  for (const std::uint32_t count : record.map_points) points += count;
-  const std::size_t probabilities = record.probability.empty() ? points : record.probability.size();
-  const std::size_t events = record.event_u.size();
-  for (const std::size_t size : {record.u.size(), record.v.size(), record.depth_m.size(),
-                                 record.confidence.size(), record.variance.size(), probabilities}) {
-    if (size != points) {
-      throw std::runtime_error(fmt::format("a list of {} points: expected {}", size, points));
-    }
-  }
-  const bool is_whole =
-      !record.map_points.empty() && record.map_camera.size() == record.map_points.size() &&
-      record.event_v.size() == events && record.negative_events.size() == events &&
-      record.positive_events.size() == events && record.knots.size() % 6 == 0 &&
-      record.expected_walk.size() == (record.knots.empty() ? 0 : 2) &&
-      (record.pose_noise.empty() || record.pose_noise.size() == 2);
-  constexpr std::uint32_t kMaxSide = std::numeric_limits<std::uint16_t>::max();
-  if (!is_whole || record.width > kMaxSide || record.height > kMaxSide) {
-    throw std::runtime_error("lists that belong together differ in length");
-  }
-}
-
-/// The begin of a message: time and frame.
-CdrWriter stampedMessage(std::int64_t t_ns, std::string_view frame) {
-  return CdrWriter().add(static_cast<std::int32_t>(logTime(t_ns) / kNanosecondsPerSecond),
-                         static_cast<std::uint32_t>(logTime(t_ns) % kNanosecondsPerSecond), frame);
+void addStamp(CdrWriter& message, std::int64_t t_ns, std::string_view frame) {
+  message.add(static_cast<std::int32_t>(logTime(t_ns) / kNanosecondsPerSecond),
+              static_cast<std::uint32_t>(logTime(t_ns) % kNanosecondsPerSecond), frame);
 }
 
 void addPose(CdrWriter& message, const Rigid3& T) {
-  for (const double value : numbersOf(T)) message.add(value);
+  for (const double value : numbersIn(T)) message.add(value);
 }
 
 }  // namespace
 
 std::string keyframeSchema() {
   std::string schema;
-  KeyframeRecord record;
-  KeyframeRecord::fields(record, [&](const char* name, const auto& field, const char* text = "") {
+  const KeyframeDepthMap keyframe;
+  const Lists lists;
+  visitFields(keyframe, lists, [&](const char* name, const auto& field, const char* text = "") {
     schema += fmt::format("{} {}{}{}\n", typeName<std::decay_t<decltype(field)>>(), name,
                           *text == '\0' ? "" : "  # ", text);
   });
@@ -253,147 +315,48 @@ std::string keyframeSchema() {
 }
 
 std::string keyframeMessage(const KeyframeDepthMap& keyframe) {
-  KeyframeRecord record;
-  record.t0_ns = keyframe.window.t0_ns;
-  record.t1_ns = keyframe.window.t1_ns;
-  record.t_ref_ns = keyframe.window.t_ref_ns;
-  record.T_world_ref = numbersOf(keyframe.T_world_ref);
-  record.T_odom_ref = numbersOf(keyframe.T_odom_ref);
-  record.T_rig_ref = numbersOf(keyframe.T_rig_ref);
-  record.width = static_cast<std::uint32_t>(keyframe.view.width);
-  record.height = static_cast<std::uint32_t>(keyframe.view.height);
-  record.intrinsics = {keyframe.view.fx, keyframe.view.fy, keyframe.view.cx, keyframe.view.cy};
-  record.min_depth_m = keyframe.planes.min_depth_m;
-  record.max_depth_m = keyframe.planes.max_depth_m;
-  record.num_planes = static_cast<std::uint32_t>(keyframe.planes.num_planes);
-  record.spacing = nameOf(keyframe.planes.spacing);
-  record.parallax_px_m = keyframe.parallax_px_m;
-  record.max_confidence = keyframe.max_confidence;
-  if (const auto& correction = keyframe.motion_correction) {
-    record.knot_spacing_s = correction->spacing_s;
-    record.reference_knot = static_cast<std::uint32_t>(correction->reference);
-    for (const Vector6d& knot : correction->knots) {
-      record.knots.insert(record.knots.end(), knot.data(), knot.data() + knot.size());
-    }
-    record.expected_walk = {correction->walk_m, correction->walk_rad};
-  }
-  if (keyframe.blur_px) record.blur_px = {*keyframe.blur_px};
-  record.sharpness_gain = keyframe.sharpness_gain;
-  record.watched_blurs = keyframe.blur_watch.last_px;
-  record.since_look = keyframe.blur_watch.since_look;
-  if (const auto& noise = keyframe.pose_noise)
-    record.pose_noise = {noise->noise_m, noise->noise_rad};
-  record.after_stop = keyframe.after_stop ? 1 : 0;
-  record.events = keyframe.events;
-  record.without_pose = keyframe.without_pose;
-  record.outside_lens = keyframe.outside_lens;
-  record.over_budget = keyframe.over_budget;
-  const VoteCounts& votes = keyframe.votes;
-  record.votes = {votes.cast, votes.interpolated, votes.outside_view, votes.behind_camera};
-  record.silent_cameras = keyframe.silent_cameras;
-  record.silent_subintervals = keyframe.silent_subintervals;
-  const PixelCounts& pixels = keyframe.map.pixels;
-  record.pixels = {pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous,
-                   pixels.neighbours};
   constexpr int kAllCameras = -1;
-  addMap(kAllCameras, keyframe.map, record);
+  Lists lists;
+  addMap(kAllCameras, keyframe.map, lists);
   for (const CameraDepthMap& of_one : keyframe.camera_maps)
-    addMap(of_one.camera, of_one.map, record);
-  record.has_events = keyframe.view_events.empty() ? 0 : 1;
-  const auto count = [](int events) {
-    return static_cast<std::uint16_t>(
-        std::min<int>(events, std::numeric_limits<std::uint16_t>::max()));
-  };
-  for (int y = 0; y < keyframe.view_events.rows; ++y) {
-    for (int x = 0; x < keyframe.view_events.cols; ++x) {
-      const cv::Vec2i& events = keyframe.view_events(y, x);
-      if (events[0] == 0 && events[1] == 0) continue;
-      record.event_u.push_back(static_cast<std::uint16_t>(x));
-      record.event_v.push_back(static_cast<std::uint16_t>(y));
-      record.negative_events.push_back(count(events[0]));
-      record.positive_events.push_back(count(events[1]));
-    }
-  }
+    addMap(of_one.camera, of_one.map, lists);
+  addEvents(keyframe.view_events, lists);
   CdrWriter message;
-  KeyframeRecord::fields(record, [&](const char*, const auto& field, const char* = "") {
-    if constexpr (ArrayOf<std::decay_t<decltype(field)>>::value) {
-      for (const auto number : field) message.add(number);
-    } else {
-      message.add(field);
-    }
-  });
+  visitFields(keyframe, lists,
+              [&](const char*, const auto& field, const char* = "") { add(message, field); });
   return std::move(message.bytes());
 }
 
 KeyframeDepthMap keyframeOf(std::string_view message) {
-  KeyframeRecord record;
+  KeyframeDepthMap keyframe;
+  Lists lists;
   ByteReader body = bodyOf(message);
-  KeyframeRecord::fields(record, [&](const char* name, auto& field, const char* = "") {
+  visitFields(keyframe, lists, [&](const char* name, auto& field, const char* = "") {
     try {
       take(body, field);
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
       throw std::runtime_error(fmt::format("field {}: {}", name, error.what()));
     }
   });
-  requireAgreement(record);
-  KeyframeDepthMap keyframe;
-  keyframe.window = {record.t0_ns, record.t1_ns, record.t_ref_ns};
-  keyframe.T_world_ref = rigidOf(record.T_world_ref);
-  keyframe.T_odom_ref = rigidOf(record.T_odom_ref);
-  keyframe.T_rig_ref = rigidOf(record.T_rig_ref);
-  const auto& [fx, fy, cx, cy] = record.intrinsics;
-  keyframe.view = {static_cast<int>(record.width), static_cast<int>(record.height), fx, fy, cx, cy};
-  keyframe.planes = {record.min_depth_m, record.max_depth_m, static_cast<int>(record.num_planes),
-                     fromName<PlaneSpacing>(record.spacing)};
-  keyframe.parallax_px_m = record.parallax_px_m;
-  keyframe.max_confidence = record.max_confidence;
-  if (!record.knots.empty()) {
-    MotionCorrection& correction = keyframe.motion_correction.emplace();
-    correction.spacing_s = record.knot_spacing_s;
-    correction.reference = record.reference_knot;
-    for (std::size_t i = 0; i < record.knots.size(); i += 6) {
-      correction.knots.emplace_back(Vector6d::Map(record.knots.data() + i));
-    }
-    correction.walk_m = record.expected_walk[0];
-    correction.walk_rad = record.expected_walk[1];
-  }
-  if (!record.blur_px.empty()) keyframe.blur_px = record.blur_px.front();
-  keyframe.sharpness_gain = record.sharpness_gain;
-  keyframe.blur_watch.last_px = record.watched_blurs;
-  keyframe.blur_watch.since_look = record.since_look;
-  if (!record.pose_noise.empty()) {
-    keyframe.pose_noise = PoseNoise{record.pose_noise[0], record.pose_noise[1]};
-  }
-  keyframe.after_stop = record.after_stop != 0;
-  keyframe.events = record.events;
-  keyframe.without_pose = record.without_pose;
-  keyframe.outside_lens = record.outside_lens;
-  keyframe.over_budget = record.over_budget;
-  const auto& votes = record.votes;
-  keyframe.votes = {votes[0], votes[1], votes[2], votes[3]};
-  keyframe.silent_cameras = record.silent_cameras;
-  keyframe.silent_subintervals = record.silent_subintervals;
+  requireAgreement(keyframe.view, lists);
+  const cv::Size size(keyframe.view.width, keyframe.view.height);
+  const PixelCounts pixels = keyframe.map.pixels;
   std::size_t end = 0;
-  for (std::size_t i = 0; i < record.map_points.size(); ++i) {
-    const std::size_t begin = std::exchange(end, end + record.map_points[i]);
-    DepthMap map = mapOf(record, begin, end);
+  for (std::size_t i = 0; i < lists.map_points.size(); ++i) {
+    const std::size_t begin = std::exchange(end, end + lists.map_points[i]);
+    DepthMap map = mapOf(size, lists, begin, end);
     if (i == 0) {
       keyframe.map = std::move(map);
     } else {
-      keyframe.camera_maps.push_back({record.map_camera[i], std::move(map)});
+      keyframe.camera_maps.push_back({lists.map_camera[i], std::move(map)});
     }
   }
-  const auto& pixels = record.pixels;
-  keyframe.map.pixels = {pixels[0], pixels[1], pixels[2], pixels[3], pixels[4]};
-  if (record.has_events == 0) return keyframe;
-  keyframe.view_events.create(keyframe.view.height, keyframe.view.width);
-  keyframe.view_events = cv::Vec2i();
-  for (std::size_t i = 0; i < record.event_u.size(); ++i) {
-    const cv::Point pixel(record.event_u[i], record.event_v[i]);
-    if (!cv::Rect({}, keyframe.view_events.size()).contains(pixel)) {
-      throw std::runtime_error(fmt::format("events at pixel ({}, {})", pixel.x, pixel.y));
-    }
-    keyframe.view_events(pixel) = {record.negative_events[i], record.positive_events[i]};
+  keyframe.map.pixels = pixels;
+  if (!lists.has_events) return keyframe;
+  keyframe.view_events = cv::Mat_<cv::Vec2i>(size, cv::Vec2i());
+  for (std::size_t i = 0; i < lists.event_u.size(); ++i) {
+    keyframe.view_events(lists.event_v[i], lists.event_u[i]) = {lists.negative_events[i],
+                                                                lists.positive_events[i]};
   }
   return keyframe;
 }
@@ -408,7 +371,8 @@ std::string pointsMessage(const KeyframeDepthMap& keyframe) {
   constexpr std::array<const char*, 5> kFields = {"x", "y", "z", "intensity", "sigma_m"};
   constexpr std::uint8_t kFloat32 = 7;
   const std::vector<ViewPoint> points = viewPoints(keyframe);
-  CdrWriter message = stampedMessage(keyframe.window.t_ref_ns, "keyframe");
+  CdrWriter message;
+  addStamp(message, keyframe.window.t_ref_ns, "keyframe");
   const auto count = static_cast<std::uint32_t>(points.size());
   message.add(1U, count, static_cast<std::uint32_t>(kFields.size()));
   std::uint32_t step = 0;
@@ -428,26 +392,27 @@ std::string pointsMessage(const KeyframeDepthMap& keyframe) {
 }
 
 std::string poseMessage(const StampedPose& pose) {
-  CdrWriter message = stampedMessage(pose.t_ns, "world");
+  CdrWriter message;
+  addStamp(message, pose.t_ns, "world");
   addPose(message, pose.T_world_rig);
   return std::move(message.bytes());
 }
 
 std::string transformMessage(const StampedPose& pose) {
   CdrWriter message;
-  message.add(1U, static_cast<std::int32_t>(logTime(pose.t_ns) / kNanosecondsPerSecond),
-              static_cast<std::uint32_t>(logTime(pose.t_ns) % kNanosecondsPerSecond), "world",
-              "keyframe");
+  message.add(1U);  // number of transforms
+  addStamp(message, pose.t_ns, "world");
+  message.add("keyframe");
   addPose(message, pose.T_world_rig);
   return std::move(message.bytes());
 }
 
 std::string pathMessage(const std::vector<StampedPose>& poses) {
-  CdrWriter message = stampedMessage(poses.empty() ? 0 : poses.back().t_ns, "world");
+  CdrWriter message;
+  addStamp(message, poses.empty() ? 0 : poses.back().t_ns, "world");
   message.add(static_cast<std::uint32_t>(poses.size()));
   for (const StampedPose& pose : poses) {
-    message.add(static_cast<std::int32_t>(logTime(pose.t_ns) / kNanosecondsPerSecond),
-                static_cast<std::uint32_t>(logTime(pose.t_ns) % kNanosecondsPerSecond), "world");
+    addStamp(message, pose.t_ns, "world");
     addPose(message, pose.T_world_rig);
   }
   return std::move(message.bytes());
@@ -463,10 +428,10 @@ std::vector<Rigid3> pathOf(std::string_view message) {
   skipHeader();
   std::vector<Rigid3> poses;
   for (auto left = body.number<std::uint32_t>(); left > 0; --left) {
-    std::array<double, 7> numbers{};
     skipHeader();
-    take(body, numbers);
-    poses.push_back(rigidOf(numbers));
+    Numbers numbers(7);
+    for (double& number : numbers) number = body.number<double>();
+    setNumbers(numbers, poses.emplace_back());
   }
   return poses;
 }

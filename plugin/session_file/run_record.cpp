@@ -82,8 +82,8 @@ void addFilesIn(const fs::path& folder, const fs::path& except, std::vector<fs::
 
 /// Returns whether a result depends on a key. Files are compared by their content.
 bool matters(const std::string& name) {
-  return name != "performance.threads" && name != "rig.calibration" && name != "rig.hand_eye" &&
-         name != "output.session_file";
+  return name != "performance.threads" && name != "performance.kernel" &&
+         name != "rig.calibration" && name != "rig.hand_eye" && name != "output.session_file";
 }
 
 /// Adds the differences of two values, key by key.

@@ -116,8 +116,7 @@ SessionFile::SessionFile(const std::filesystem::path& path) : file_(path, O_RDON
                              ": no session file: expected the magic word of MCAP at its begin");
   }
   try {
-    const std::uint64_t chunks = readChannels();
-    if (!readIndex()) scan(chunks);
+    if (!readIndex()) scan();
     if (!run_chunk_) {
       if (damage_.empty()) throw std::runtime_error("no session file: expected the topic /efm/run");
       return;
@@ -148,23 +147,6 @@ std::optional<std::pair<McapOp, std::uint64_t>> SessionFile::headAt(std::uint64_
   return std::pair(op, kMcapRecordHead + size);
 }
 
-/// Reads the channels, which stand before the first chunk. @return the position of that chunk.
-std::uint64_t SessionFile::readChannels() {
-  std::uint64_t position = kMcapMagic.size();
-  while (const auto head = headAt(position)) {
-    if (head->first == McapOp::kChunk || head->first == McapOp::kDataEnd) break;
-    if (head->first == McapOp::kChannel) {
-      const std::string bytes = file_.read(position, head->second);
-      ByteReader reader = readerOf(bytes);
-      McapRecord record = takeMcapRecord(reader);
-      const auto channel = takeMcapFields<McapChannel>(record.content);
-      channels_[channel.id] = channelOf(channel.topic);
-    }
-    position += head->second;
-  }
-  return position;
-}
-
 /// Reads the index at the end of the file. @return false if there is none.
 bool SessionFile::readIndex() {
   const std::uint64_t tail = kMcapRecordHead + kMcapFooterContent + kMcapMagic.size();
@@ -183,6 +165,7 @@ bool SessionFile::readIndex() {
   ByteReader records = readerOf(summary);
   while (records.remaining() > 0) {
     McapRecord record = takeMcapRecord(records);
+    noteChannel(record);
     if (record.op != McapOp::kChunkIndex) continue;
     const auto chunk = takeMcapFields<McapChunkIndex>(record.content);
     ByteReader indexes = readerOf(chunk.message_indexes);
@@ -195,29 +178,35 @@ bool SessionFile::readIndex() {
 }
 
 /// Finds the chunks without the index, until the first byte that is not whole.
-void SessionFile::scan(std::uint64_t position) {
+void SessionFile::scan() {
   const std::uint64_t size = file_.size();
-  while (position < size) {
-    const auto head = headAt(position);
-    if (head && head->first == McapOp::kDataEnd) return;
-    try {
+  std::uint64_t position = kMcapMagic.size();
+  try {
+    while (position < size) {
+      const auto head = headAt(position);
       if (!head) throw std::runtime_error(fmt::format("byte {}: the file is cut off", position));
-      if (head->first == McapOp::kChunk) {
-        const Chunk chunk = chunkAt(position);
-        ByteReader records = readerOf(chunk.records);
-        while (records.remaining() > 0) {
-          McapRecord record = takeMcapRecord(records);
-          if (record.op != McapOp::kMessage) continue;
-          note(channels_[takeMcapFields<McapMessage>(record.content).channel], position);
-        }
+      if (head->first == McapOp::kDataEnd) return;
+      std::string bytes = file_.read(position, head->second);
+      if (head->first == McapOp::kChunk) bytes = chunkAt(position).records;
+      ByteReader records = readerOf(bytes);
+      while (records.remaining() > 0) {
+        McapRecord record = takeMcapRecord(records);
+        noteChannel(record);
+        if (record.op != McapOp::kMessage) continue;
+        note(channels_[takeMcapFields<McapMessage>(record.content).channel], position);
       }
-    } catch (const std::runtime_error& error) {
-      damage_ = error.what();
-      return;
+      position += head->second;
     }
-    position += head->second;
+    damage_ = fmt::format("byte {}: the run did not end", size);
+  } catch (const std::runtime_error& error) {
+    damage_ = error.what();
   }
-  damage_ = fmt::format("byte {}: the run did not end", size);
+}
+
+void SessionFile::noteChannel(McapRecord& record) {
+  if (record.op != McapOp::kChannel) return;
+  const auto channel = takeMcapFields<McapChannel>(record.content);
+  channels_[channel.id] = channelOf(channel.topic);
 }
 
 /// Notes a message of a chunk.
@@ -304,25 +293,24 @@ std::string SessionFile::report() const {
   return report_ ? messageText(messageIn(chunkAt(*report_), kReport)) : std::string();
 }
 
-SessionWriter::SessionWriter(const std::filesystem::path& path, const nlohmann::ordered_json& run)
-    : file_(path, O_RDWR | O_CREAT | O_TRUNC),
+SessionWriter::SessionWriter(const std::filesystem::path& path, int flags)
+    : file_(path, O_RDWR | flags),
       mcap_(topics(), [this](std::uint64_t position, const std::string& bytes) {
         file_.append(position, bytes);
-      }) {
+      }) {}
+
+SessionWriter::SessionWriter(const std::filesystem::path& path, const nlohmann::ordered_json& run)
+    : SessionWriter(path, O_CREAT | O_TRUNC) {
+  using Json = nlohmann::ordered_json;
   mcap_.begin();
-  nlohmann::ordered_json versioned = {{"session", kVersion}};
+  Json versioned = {{"session", kVersion}};
   versioned.update(run);
-  mcap_.add(kRun, 0,
-            textMessage(
-                versioned.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+  mcap_.add(kRun, 0, textMessage(versioned.dump(-1, ' ', false, Json::error_handler_t::replace)));
   mcap_.finishChunk();
 }
 
 SessionWriter::SessionWriter(const SessionFile& earlier, std::size_t keyframes)
-    : file_(earlier.path(), O_RDWR),
-      mcap_(topics(), [this](std::uint64_t position, const std::string& bytes) {
-        file_.append(position, bytes);
-      }) {
+    : SessionWriter(earlier.path(), 0) {
   if (keyframes > earlier.keyframes()) {
     throw std::runtime_error(fmt::format("{}: {} keyframes: expected {}", earlier.path().string(),
                                          earlier.keyframes(), keyframes));

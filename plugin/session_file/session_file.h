@@ -81,9 +81,9 @@ class SessionFile {
     std::string records;  // not compressed
   };
 
-  std::uint64_t readChannels();
   bool readIndex();
-  void scan(std::uint64_t position);
+  void scan();
+  void noteChannel(McapRecord& record);
   void note(int channel, std::uint64_t chunk);
   std::optional<std::pair<McapOp, std::uint64_t>> headAt(std::uint64_t position) const;
   Chunk chunkAt(std::uint64_t position) const;
@@ -117,6 +117,8 @@ class SessionWriter {
   double seconds() const { return seconds_; }  ///< Of `add`, with the waits for the disk.
 
  private:
+  SessionWriter(const std::filesystem::path& path, int flags);
+
   FileHandle file_;
   McapFile mcap_;
   double seconds_ = 0;

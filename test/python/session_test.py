@@ -192,16 +192,17 @@ def test_a_complete_map_is_not_changed_and_given_again(result):
         ef.map(DESK, OPTIONS, resume=True)
 
 
-def test_mapper_writes_a_session(tmp_path):
+def test_mappers_write_a_session_in_playback_and_live(tmp_path):
     file = tmp_path / "live.mcap"
     desk = ef.open(DESK)
-    for round_number in range(2):
-        mapper = ef.Mapper({**OPTIONS, "output.session_file": file, "rig.calibration": DESK + "/camchain.yaml"})
+    for live in (False, True):
+        mapper = ef.Mapper({**OPTIONS, "output.session_file": file, "live.enabled": live})
         mapper.add_recording(desk)
         mapper.finish()
         session = ef.Session(file)
-        assert len(session) == mapper.status["counts"]["keyframes"] if "counts" in mapper.status else len(session) > 0
+        assert len(session) == len(mapper.trajectory[0]) > 0 and session.damage == ""
         assert session.report["map_hash"] == mapper.hash
+        assert np.array_equal(session.poses()[1], mapper.trajectory[1])
     assert sorted(os.listdir(tmp_path)) == ["live.mcap", "live.mcap.1"]
     with pytest.raises(OSError, match="there is no folder"):
         ef.Mapper({"output.session_file": tmp_path / "missing" / "a.mcap"})

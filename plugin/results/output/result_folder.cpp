@@ -633,13 +633,12 @@ std::string ResultFolder::abandon() {
       hasEarlier() ? fmt::format("; the earlier result in {} stays", out_.string()) : "";
   try {
     const std::uint64_t keyframes = countKeyframes(places_.partial);
-    stays_ = keyframes > 0;
+    const bool can_go_on = fs::exists(places_.partial / kSession);
+    stays_ = keyframes > 0 && (can_go_on || earlier.empty());
     if (!stays_) return earlier;
     return earlier + fmt::format("; the keyframes before it ({}) are in {}{}", keyframes,
                                  places_.partial.string(),
-                                 fs::exists(places_.partial / kSession)
-                                     ? ": run again with --resume to go on with them"
-                                     : "");
+                                 can_go_on ? ": run again with --resume to go on with them" : "");
   } catch (const fs::filesystem_error&) {  // the disk cannot be read
     return earlier;
   }

@@ -21,6 +21,7 @@
 
 #include "plugin/mrpt/host_options.h"
 #include "plugin/options/option_keys.h"
+#include "plugin/session_file/session_file.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -120,7 +121,9 @@ TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
     EventFusionOptions options = in(refinedOptions());
     options.refinement.enabled = is_refined;
     options.refinement.refiner.adapt_tracker = false;
-    CEventFusionMapBuilder builder(options);
+    EventFusionOptions with_session = options;
+    with_session.session_file = testing::TempDir() + "builder.mcap";
+    CEventFusionMapBuilder builder(with_session);
     play(builder, observations);
     mrpt::maps::CSimpleMap initial;
     builder.getCurrentlyBuiltMap(initial);
@@ -147,6 +150,16 @@ TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
     querier.join();
     expectSameMap(snapshotOf(builder), *mapper.snapshot());
     EXPECT_EQ(builder.trajectory().size(), 24U);
+    const SessionFile session(with_session.session_file);
+    const std::vector<StampedPose> stored = session.poses(true);
+    ASSERT_EQ(stored.size(), 12U) << "without the initial map";
+    for (std::size_t i = 0; i < stored.size(); ++i) {
+      EXPECT_TRUE(isSame(stored[i].T_world_rig, builder.trajectory()[12 + i].T_world_rig)) << i;
+    }
+    EXPECT_THAT(session.report(), HasSubstr(mapHash(*builder.points())));
+    for (const char* number : {"", ".1", ".2", ".3", ".4"}) {
+      std::filesystem::remove(with_session.session_file.string() + number);
+    }
     expectGettersAgree(builder);
     if (is_refined) continue;
     const PoseSample& newest = std::get<PoseSample>(samples.back());

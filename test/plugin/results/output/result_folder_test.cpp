@@ -357,9 +357,16 @@ TEST_F(ResultFolderTest, OfAFailedRunTheKeyframesStayIfThereIsNoEarlierResult) {
   {
     ResultFolder result(out, OutputKind::kMap);
     write(result.path(), keyframe);
+    EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() + " stays");
+  }
+  EXPECT_FALSE(fs::exists(folder() / "out.partial")) << "the disk may be full";
+  {
+    ResultFolder result(out, OutputKind::kMap);
+    write(result.path(), keyframe);
+    write(result.path(), {{"session.mcap", ""}});
     EXPECT_EQ(result.abandon(), "; the earlier result in " + out.string() +
                                     " stays; the keyframes before it (1) are in " + out.string() +
-                                    ".partial");
+                                    ".partial: run again with --resume to go on with them");
   }
   EXPECT_EQ(filesBelow(folder() / "out.partial").count("keyframes/1.000000000/depth.tiff"), 1U);
   EXPECT_EQ(filesBelow(out), resultOf("old"));
