@@ -232,11 +232,13 @@ Report mapRecording(const std::vector<std::filesystem::path>& files,
 /// Writes a binary PCD file with the fields of MapPoint. The file appears when it is complete.
 /// @throws std::runtime_error naming the file.
 void writePcd(const std::filesystem::path& file, const MapCloud& cloud);
-/// Writes a binary PLY file, coloured by height along the world's z axis. (map.ply of a recording
-/// is coloured along the mean upward axis of its cameras.)
+/// Writes a binary PLY file, coloured by height. (map.ply of a recording is coloured along the mean
+/// upward axis of its cameras.)
 /// @param views keyframes of the map, `Mapper::trajectory`: each point gets a normal towards the
 /// first keyframe that saw it. Empty: no normals.
+/// @param upward a unit vector, frame `world`.
 void writePly(const std::filesystem::path& file, const MapCloud& cloud,
-              const std::vector<StampedPose>& views = {});
+              const std::vector<StampedPose>& views = {},
+              const Eigen::Vector3d& upward = Eigen::Vector3d::UnitZ());
 
 }  // namespace efm

@@ -52,17 +52,29 @@ void addImport(CLI::App& app, Run& run) {
 
 void addExport(CLI::App& app, Run& run) {
   CLI::App& command =
-      *app.add_subcommand("export", "Write a recording for other tools: text, MCAP");
+      *app.add_subcommand("export",
+                          "Write a recording for other tools: text, MCAP; or the map of sessions "
+                          "(session.mcap) again: .pcd, .ply, .simplemap");
   auto arguments = argumentsOf(command, run, runExport);
   addSource(command, arguments->source);
   const auto name_example = [](const std::string& format) {
     return format == "dsec" ? "'dsec': Python writes it: examples/python/export_dsec.py"
                             : std::string();
   };
-  command.add_option("--to", arguments->format, "The format to write")
-      ->required()
+  command.add_option("--to", arguments->format, "The format to write (recordings)")
       ->check(CLI::Validator(name_example, ""))
       ->check(oneOf(exportFormats()));
+  command
+      .add_option("--set", arguments->sets,
+                  "Sessions: another option of [map], or a higher depth.min_probability; may be "
+                  "repeated")
+      ->type_name("SECTION.KEY=VALUE")
+      ->allow_extra_args(false);
+  constexpr int kCorners = 6;
+  command.add_option("--box", arguments->box_m, "Sessions: the points inside alone, world metres")
+      ->type_name("X0,Y0,Z0,X1,Y1,Z1")
+      ->delimiter(',')
+      ->expected(kCorners);
   command.add_option("--out", arguments->out, "The folder or the file to write; a new one")
       ->required()
       ->type_name("PATH");

@@ -60,6 +60,8 @@ struct ExportArguments {
   std::string format;  ///< A name of `exportFormats`.
   std::filesystem::path out;
   Verbosity verbosity = Verbosity::kNormal;
+  std::vector<std::string> sets;  ///< Of sessions: section.key=value.
+  std::vector<double> box_m;      ///< Of sessions: x0 y0 z0 x1 y1 z1, or empty.
 };
 
 /// Returns the formats that this build writes.

@@ -9,17 +9,20 @@
 #include <string>
 #include <utility>
 
+#include "event_fusion/engine.h"
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
+#include "plugin/app/program.h"
 #include "plugin/app/recording_interval.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/playback/output_checks.h"
 #include "plugin/playback/progress.h"
 #include "plugin/playback/recording_info.h"
+#include "plugin/playback/session_export.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
-#include "plugin/checks/health_checks.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -123,7 +126,54 @@ std::vector<std::string> exportFormats() {
   return names;
 }
 
+namespace {
+
+/// Writes the map of sessions.
+int exportSessions(const ExportArguments& arguments) {
+  const RecordingSource& source = arguments.source;
+  if (!arguments.format.empty()) {
+    throw UsageError("--to " + arguments.format +
+                     ": a session's map is exported: the ending of --out decides (.pcd, .ply, "
+                     ".simplemap)");
+  }
+  SessionExport what;
+  what.sessions = source.files;
+  what.sets = arguments.sets;
+  what.limits = RecordingTimes(source).resolve(arguments.times);
+  const std::string poses = source.poses.string();
+  if (!poses.empty() && poses != "refined" && poses != "tracker") {
+    throw UsageError("--poses " + poses + ": expected refined or tracker");
+  }
+  what.refined = poses != "tracker";
+  if (const std::vector<double>& m = arguments.box_m; !m.empty()) {
+    what.box = Box{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}};
+    if (!(what.box->min_m.array() <= what.box->max_m.array()).all()) {
+      throw UsageError("--box: expected the lower corner first: X0,Y0,Z0,X1,Y1,Z1");
+    }
+  }
+  const MapSnapshot map = asUsage([&] { return exportSession(what, arguments.out); });
+  if (arguments.verbosity != Verbosity::kQuiet) {
+    fmt::print("{} keyframes, {} points, hash {}; written to {}\n", map.trajectory.size(),
+               map.points->size(), mapHash(*map.points), arguments.out.string());
+  }
+  return 0;
+}
+
+}  // namespace
+
 int runExport(const ExportArguments& arguments) {
+  const std::vector<std::filesystem::path>& files = arguments.source.files;
+  const auto sessions = std::count_if(files.begin(), files.end(), sessionAt);
+  if (sessions == static_cast<std::ptrdiff_t>(files.size())) return exportSessions(arguments);
+  if (sessions > 0) throw UsageError("SOURCE: sessions and recordings: expected one of both kinds");
+  for (const char* option :
+       {arguments.sets.empty() ? "" : "--set", arguments.box_m.empty() ? "" : "--box"}) {
+    if (*option != '\0') {
+      throw UsageError(std::string(option) + ": is for sessions (session.mcap of a map)");
+    }
+  }
+  if (arguments.format.empty())
+    throw UsageError("--to is required; see event-fusion export --help");
   rejectReplacing(arguments.out, inputsOf(arguments.source));
   if (std::filesystem::is_regular_file(arguments.out)) {  // an empty folder is allowed
     throw std::runtime_error(arguments.out.string() +

@@ -18,12 +18,14 @@
 #include "plugin/app/commands.h"
 #include "plugin/app/program.h"
 #include "plugin/app/recording_interval.h"
+#include "plugin/checks/health_checks.h"
 #include "plugin/playback/progress.h"
 #include "plugin/playback/recording_info.h"
+#include "plugin/playback/session_export.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/checks/health_checks.h"
 #include "plugin/session/session_status.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 namespace {
@@ -158,9 +160,52 @@ void printSystem() {
 
 }  // namespace
 
+namespace {
+
+/// Prints what a session file has.
+void printSession(const std::filesystem::path& file, bool as_json) {
+  using Json = nlohmann::ordered_json;
+  const SessionFile session(file);
+  const Json& run = session.run();
+  const Json report = Json::parse(session.report(), nullptr, false);
+  Json info = {{"session", file.string()},
+               {"version", run.value("version", "")},
+               {"keyframes", session.keyframes()},
+               {"generations", session.generations()},
+               {"complete", session.damage().empty() && !report.is_discarded()}};
+  if (session.keyframes() > 0) {
+    info["first_s"] = formatSeconds(session.keyframe(0).window.t_ref_ns);
+    info["last_s"] = formatSeconds(session.keyframe(session.keyframes() - 1).window.t_ref_ns);
+  }
+  if (!session.damage().empty()) info["damage"] = session.damage();
+  for (const auto& recorded : run.value("files", Json::array())) {
+    info["recording"].push_back(recorded.value("name", ""));
+  }
+  if (report.is_object()) {
+    for (const char* key : {"points", "map_hash", "quality", "stopped_at"}) {
+      if (report.contains(key)) info[key] = report[key];
+    }
+  }
+  if (as_json) return fmt::print("{}\n", info.dump(2, ' ', false, Json::error_handler_t::replace));
+  for (const auto& [key, value] : info.items()) {
+    const Json& shown = key == "quality" && value.is_object() ? value.at("word") : value;
+    fmt::print("{:<12} {}\n", key,
+               shown.is_string() ? shown.get<std::string>()
+                                 : shown.dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+}
+
+}  // namespace
+
 int runInfo(const InfoArguments& arguments) {
   if (arguments.system) printSystem();
   if (arguments.source.files.empty()) return 0;
+  if (const std::filesystem::path& file = arguments.source.files.front();
+      arguments.source.files.size() == 1 && !std::filesystem::is_directory(file) &&
+      sessionAt(file)) {
+    printSession(file, arguments.json);
+    return 0;
+  }
   RecordingSource source = arguments.source;
   source.limits = RecordingTimes(source).resolve(arguments.times);
   RecordingInfo info;

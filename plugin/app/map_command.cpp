@@ -14,6 +14,7 @@
 #include "plugin/options/option_file.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/output_checks.h"
+#include "plugin/playback/session_export.h"
 #include "plugin/recordings/open/mrpt_library.h"
 
 namespace efm {
@@ -169,7 +170,21 @@ class Watchers {
 
 }  // namespace
 
+namespace {
+
+/// @throws UsageError if the recording is a session, whose map is exported.
+void rejectSessions(const RecordingSource& source) {
+  for (const std::filesystem::path& file : source.files) {
+    if (!sessionAt(file) || std::filesystem::is_directory(file)) continue;
+    throw UsageError(file.string() + ": a session: its map is made again by `event-fusion export " +
+                     file.string() + " --out map.pcd`");
+  }
+}
+
+}  // namespace
+
 int runMap(const MapArguments& arguments) {
+  rejectSessions(arguments.source);
   CommandLineJob command(arguments, OutputKind::kMap);
   MapJob& job = command.job;
   TimeLimits& limits = job.options.mapper.limits;

@@ -137,6 +137,17 @@ SessionFile::SessionFile(const std::filesystem::path& path) : file_(path, O_RDON
   }
 }
 
+bool SessionFile::is(const std::filesystem::path& path) {
+  constexpr std::uint64_t kBegin = 1 << 16;  // the channels come first
+  try {
+    const std::string begin = FileHandle(path, O_RDONLY).read(0, kBegin);
+    return begin.compare(0, kMcapMagic.size(), kMcapMagic) == 0 &&
+           begin.find(topics()[kKeyframe - 1].topic) != std::string::npos;
+  } catch (const std::runtime_error&) {  // it cannot be read
+    return false;
+  }
+}
+
 std::optional<std::pair<McapOp, std::uint64_t>> SessionFile::headAt(std::uint64_t position) const {
   const std::string head = file_.read(position, kMcapRecordHead);
   if (head.size() < kMcapRecordHead) return std::nullopt;

@@ -53,6 +53,8 @@ class SessionFile {
   /// @throws std::runtime_error naming the file if it cannot be read, is no session file, or is of
   /// a newer version.
   explicit SessionFile(const std::filesystem::path& path);
+  /// Returns whether a file is a session file of any version.
+  static bool is(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return file_.path(); }
   /// Returns how the map was made (docs/session.md, "run"); null if the run ended before its first

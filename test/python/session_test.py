@@ -2,6 +2,7 @@
 """Session files, read by the package and by a reader that knows only the specifications of MCAP, CDR and ROS 2."""
 
 import hashlib
+import json
 import os
 import struct
 import subprocess
@@ -214,3 +215,39 @@ def test_program_and_module_have_the_same_hash(result, tmp_path):
     words += [f"--set={key}={str(value).lower()}" for key, value in OPTIONS.items()]
     text = subprocess.run([*words, "--set=performance.threads=1"], check=True, capture_output=True, text=True).stdout
     assert f"hash        {made.hash}\n" in text
+
+
+def program(*words):
+    words = [os.environ["EFM_EVENT_FUSION"], *map(str, words)]
+    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+
+
+def mapped(out, options):
+    program("map", DESK, "-q", "--out", out, *(f"--set={key}={str(value).lower()}" for key, value in options.items()))
+    return out
+
+
+EXPORTS = {
+    "voxels": ({}, {"map.voxel_size_m": 0.05}),
+    "support": ({"map.consistency": "visibility"}, {"map.min_keyframes": 2}),
+    "visibility": ({"map.consistency": "none"}, {"map.consistency": "visibility"}),
+    "outliers": ({}, {"map.outlier_radius_m": 0.05, "map.outlier_min_neighbors": 4}),
+    "quality": ({"keyframes.stride_s": 0.2}, {"map.min_keyframe_quality": "median"}),
+    "late": ({"fusion.late": True}, {"map.voxel_size_m": 0.03}),
+    "probability": ({"refinement.enabled": False}, {"depth.min_probability": 0.97}),
+}
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_the_map_of_a_session_is_that_of_a_new_run(name, tmp_path):
+    before, change = EXPORTS[name]
+    first = mapped(tmp_path / "first", {**OPTIONS, **before})
+    if "median" in change.values():
+        shares = json.loads((first / "report.json").read_text())["quality"]["keyframes"]
+        change = {"map.min_keyframe_quality": sorted(shares)[len(shares) // 2] + 1e-4}  # they have three decimals
+    new = mapped(tmp_path / "new", {**OPTIONS, **before, **change})
+    sets = [f"--set={key}={value}" for key, value in change.items()]
+    for file in ("map.pcd", "map.simplemap"):
+        program("export", first, *sets, "--out", tmp_path / file)
+        assert (tmp_path / file).read_bytes() == (new / file).read_bytes(), file
+    assert (first / "map.pcd").read_bytes() != (new / "map.pcd").read_bytes()

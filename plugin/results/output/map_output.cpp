@@ -128,8 +128,8 @@ void MapOutput::writeText(const std::string& name,
 }
 
 void writePly(const std::filesystem::path& file, const MapCloud& cloud,
-              const std::vector<StampedPose>& views) {
-  const std::vector<PointColour> colours = coloursByHeight(cloud, Eigen::Vector3d::UnitZ());
+              const std::vector<StampedPose>& views, const Eigen::Vector3d& upward) {
+  const std::vector<PointColour> colours = coloursByHeight(cloud, upward);
   writeAtomically(
       file, byStream([&](std::ostream& stream) { writePlyTo(stream, cloud, colours, views); }));
 }
