@@ -256,7 +256,7 @@ void defineJobs(py::module_& module) {
           releases)
       .def("poses", &storedPoses)
       .def_property_readonly(
-          "run", [](const SessionFile& f) { return f.run().is_null() ? "{}" : f.run().dump(); })
+          "run", [](const SessionFile& f) { return f.run().dump(); })
       .def_property_readonly("report", &SessionFile::report)
       .def_property_readonly("damage", &SessionFile::damage);
   module.def("run_dsi", &mapDsi);

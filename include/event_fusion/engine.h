@@ -201,8 +201,8 @@ class Mapper {
 
 /// Returns the SHA-256 of a map's points in hexadecimal digits: rows of x, y, z (metres, frame
 /// `world`), intensity, sigma, probability (-1: not known) and support as little-endian doubles,
-/// sorted. The same recording and options have the same hash, on any number of threads and any
-/// host.
+/// sorted. The same recording and options have the same hash on any number of threads, in the
+/// program, C++, Python and MRPT in playback (docs/session.md names the exceptions).
 std::string mapHash(const MapCloud& cloud);
 
 /// What `mapRecording` made.

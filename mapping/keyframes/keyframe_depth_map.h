@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mapping/depth/depth_map.h"
@@ -61,6 +62,7 @@ struct KeyframeDepthMap {
   std::optional<PoseNoise> pose_noise;  ///< What the tracker states for the pose.
   /// It was made after the run was stopped: the rest of the input may make another one.
   bool after_stop = false;
+  std::string kernel;  ///< The kernel that made it: kernels may round differently.
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;

@@ -164,6 +164,7 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
       arena.execute([&] { return mapBest(input, trajectory, sink, times); });
 
   ++keyframes_;
+  keyframe.kernel = nameOf(options_.sweep.kernelOrFastest());
   keyframe.blur_watch = blur_;
   keyframe.T_odom_ref = keyframe.T_world_ref;
   keyframe.T_rig_ref = referencePose({});

@@ -70,6 +70,14 @@ void addExport(CLI::App& app, Run& run) {
                   "repeated")
       ->type_name("SECTION.KEY=VALUE")
       ->allow_extra_args(false);
+  command
+      .add_option("--transform", arguments->transforms,
+                  "Sessions: T_first_this of the second session and further ones, as --hand-eye is "
+                  "read; once per session")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  command.add_flag("--store", arguments->store,
+                   "Sessions: add the poses of --poses FILE to the session, for later exports");
   constexpr int kCorners = 6;
   command.add_option("--box", arguments->box_m, "Sessions: the points inside alone, world metres")
       ->type_name("X0,Y0,Z0,X1,Y1,Z1")

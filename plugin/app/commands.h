@@ -60,8 +60,10 @@ struct ExportArguments {
   std::string format;  ///< A name of `exportFormats`.
   std::filesystem::path out;
   Verbosity verbosity = Verbosity::kNormal;
-  std::vector<std::string> sets;  ///< Of sessions: section.key=value.
-  std::vector<double> box_m;      ///< Of sessions: x0 y0 z0 x1 y1 z1, or empty.
+  std::vector<std::string> sets;                  ///< Of sessions: section.key=value.
+  std::vector<double> box_m;                      ///< Of sessions: x0 y0 z0 x1 y1 z1, or empty.
+  std::vector<std::filesystem::path> transforms;  ///< T_first_this of further sessions.
+  bool store = false;                             ///< Add the poses to the session.
 };
 
 /// Returns the formats that this build writes.

@@ -19,11 +19,13 @@
 #include "plugin/playback/progress.h"
 #include "plugin/playback/recording_info.h"
 #include "plugin/playback/session_export.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/session/session_status.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 int runImport(const ImportArguments& arguments) {
@@ -128,9 +130,34 @@ std::vector<std::string> exportFormats() {
 
 namespace {
 
+/// Rejects an output that exists.
+void requireNew(const ExportArguments& arguments) {
+  rejectReplacing(arguments.out, inputsOf(arguments.source));
+  if (!std::filesystem::is_regular_file(arguments.out)) return;  // an empty folder is allowed
+  throw std::runtime_error(arguments.out.string() +
+                           ": it exists: expected the name of a new file or folder");
+}
+
+/// Returns the limits of keyframes. "+3" counts from the first keyframe of the first session.
+TimeLimits limitsIn(const std::vector<std::filesystem::path>& sessions,
+                    const TimeArguments& times) {
+  TimeLimits limits;
+  const auto first_ns = [&] {
+    return SessionFile(sessionAt(sessions.front()).value()).poses(false).front().t_ns;
+  };
+  const auto resolved = [&](const TimeArgument& time) {
+    return time.ns + (time.from_start ? first_ns() : 0);
+  };
+  if (times.t0) limits.t0_ns = resolved(*times.t0);
+  if (times.t1) limits.t1_ns = resolved(*times.t1);
+  if (times.duration_ns) limits.t1_ns = limits.t0_ns.value_or(first_ns()) + *times.duration_ns;
+  return limits;
+}
+
 /// Writes the map of sessions.
 int exportSessions(const ExportArguments& arguments) {
   const RecordingSource& source = arguments.source;
+  requireNew(arguments);
   if (!arguments.format.empty()) {
     throw UsageError("--to " + arguments.format +
                      ": a session's map is exported: the ending of --out decides (.pcd, .ply, "
@@ -139,19 +166,34 @@ int exportSessions(const ExportArguments& arguments) {
   SessionExport what;
   what.sessions = source.files;
   what.sets = arguments.sets;
-  what.limits = RecordingTimes(source).resolve(arguments.times);
+  what.limits = limitsIn(source.files, arguments.times);
   const std::string poses = source.poses.string();
-  if (!poses.empty() && poses != "refined" && poses != "tracker") {
-    throw UsageError("--poses " + poses + ": expected refined or tracker");
-  }
   what.refined = poses != "tracker";
+  if (!poses.empty() && poses != "refined" && poses != "tracker") what.poses = source.poses;
+  what.store = arguments.store;
+  if (what.store && what.poses.empty()) {
+    throw UsageError("--store: expected --poses FILE, whose poses are stored");
+  }
+  if (arguments.transforms.size() >= what.sessions.size()) {
+    throw UsageError(
+        fmt::format("--transform: given {} times: expected at most once for each "
+                    "session after the first ({})",
+                    arguments.transforms.size(), what.sessions.size() - 1));
+  }
+  for (const std::filesystem::path& file : arguments.transforms) {
+    what.T_first_this.push_back(readHandEye(file));
+  }
   if (const std::vector<double>& m = arguments.box_m; !m.empty()) {
     what.box = Box{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}};
     if (!(what.box->min_m.array() <= what.box->max_m.array()).all()) {
       throw UsageError("--box: expected the lower corner first: X0,Y0,Z0,X1,Y1,Z1");
     }
   }
-  const MapSnapshot map = asUsage([&] { return exportSession(what, arguments.out); });
+  asUsage([&] {
+    requireEnding(arguments.out, what);
+    return optionsOf(what);
+  });
+  const MapSnapshot map = exportSession(what, arguments.out);
   if (arguments.verbosity != Verbosity::kQuiet) {
     fmt::print("{} keyframes, {} points, hash {}; written to {}\n", map.trajectory.size(),
                map.points->size(), mapHash(*map.points), arguments.out.string());
@@ -167,18 +209,20 @@ int runExport(const ExportArguments& arguments) {
   if (sessions == static_cast<std::ptrdiff_t>(files.size())) return exportSessions(arguments);
   if (sessions > 0) throw UsageError("SOURCE: sessions and recordings: expected one of both kinds");
   for (const char* option :
-       {arguments.sets.empty() ? "" : "--set", arguments.box_m.empty() ? "" : "--box"}) {
+       {arguments.sets.empty() ? "" : "--set", arguments.box_m.empty() ? "" : "--box",
+        arguments.transforms.empty() ? "" : "--transform", arguments.store ? "--store" : ""}) {
     if (*option != '\0') {
       throw UsageError(std::string(option) + ": is for sessions (session.mcap of a map)");
     }
   }
-  if (arguments.format.empty())
-    throw UsageError("--to is required; see event-fusion export --help");
-  rejectReplacing(arguments.out, inputsOf(arguments.source));
-  if (std::filesystem::is_regular_file(arguments.out)) {  // an empty folder is allowed
-    throw std::runtime_error(arguments.out.string() +
-                             ": it exists: expected the name of a new file or folder");
+  if (arguments.format.empty()) {
+    const std::string ending = arguments.out.extension().string();
+    const bool is_map = ending == ".pcd" || ending == ".ply" || ending == ".simplemap";
+    throw UsageError(is_map ? files.front().string() +
+                                  ": no session of a map: expected a session.mcap or its folder"
+                            : "--to is required; see event-fusion export --help");
   }
+  requireNew(arguments);
   RecordingSource source = arguments.source;
   source.complete = false;
   source.limits = RecordingTimes(source).resolve(arguments.times);

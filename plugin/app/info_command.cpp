@@ -172,7 +172,8 @@ void printSession(const std::filesystem::path& file, bool as_json) {
                {"version", run.value("version", "")},
                {"keyframes", session.keyframes()},
                {"generations", session.generations()},
-               {"complete", session.damage().empty() && !report.is_discarded()}};
+               {"complete",
+                report.is_object() && !report.contains("stopped_at") && !report.contains("error")}};
   if (session.keyframes() > 0) {
     info["first_s"] = formatSeconds(session.keyframe(0).window.t_ref_ns);
     info["last_s"] = formatSeconds(session.keyframe(session.keyframes() - 1).window.t_ref_ns);
@@ -200,10 +201,9 @@ void printSession(const std::filesystem::path& file, bool as_json) {
 int runInfo(const InfoArguments& arguments) {
   if (arguments.system) printSystem();
   if (arguments.source.files.empty()) return 0;
-  if (const std::filesystem::path& file = arguments.source.files.front();
-      arguments.source.files.size() == 1 && !std::filesystem::is_directory(file) &&
-      sessionAt(file)) {
-    printSession(file, arguments.json);
+  if (const auto session = sessionAt(arguments.source.files.front());
+      session && arguments.source.files.size() == 1) {
+    printSession(*session, arguments.json);
     return 0;
   }
   RecordingSource source = arguments.source;

@@ -221,7 +221,10 @@ void MapperDriver::endStored() {
                                            {"keyframes", status.counts.keyframes},
                                            {"points", map->points->size()},
                                            {"map_hash", mapHash(*map->points)},
-                                           {"quality", textOf(status.quality)}}
+                                           {"quality",
+                                            {{"word", std::string(nameOf(status.quality.word))},
+                                             {"wrong_share", status.quality.wrong_share},
+                                             {"reasons", status.quality.reasons}}}}
                         .dump(2));
     stored_.reset();
   });

@@ -262,18 +262,19 @@ void findStored(Job& job) {
   }
 }
 
-/// Warns if the stored keyframes are of a kernel that rounds in another way.
+/// Warns if stored keyframes are of a kernel that rounds in another way.
 void warnOfKernels(Job& job) {
-  const auto kernelOf = [](const nlohmann::ordered_json& run) {
-    const std::string kernel = run.value("kernel", std::string());
+  const auto rounding = [](const std::string& kernel) {
     return kernel == "avx512" ? "avx2" : kernel;  // they agree bit for bit
   };
-  const std::string before = kernelOf(job.stored->session->run()), now = kernelOf(job.run);
-  if (before == now) return;
-  addWarning(job.report.warnings, "mixed-kernels",
-             "the first {} keyframes are by the kernel {}, the others by {}: they agree up to "
-             "rounding (--set performance.kernel={} goes on exactly)",
-             job.stored->keyframes(), before, now, before);
+  const std::string now(nameOf(job.options.mapper.keyframe.sweep.kernelOrFastest()));
+  for (const std::string& kernel : job.stored->kernels) {
+    if (rounding(kernel) == rounding(now)) continue;
+    addWarning(job.report.warnings, "mixed-kernels",
+               "stored keyframes are by the kernel {}, the next ones by {}: they agree up to "
+               "rounding (if all are of one: --set performance.kernel={} goes on exactly)",
+               kernel, now, kernel);
+  }
 }
 
 /// Passes over the recording for max_confidence = sequence: the robust maximum of the keyframes'
@@ -289,6 +290,26 @@ std::optional<double> sequenceMaximum(const Job& job, const FirstPass& first) {
                           interruptible(job, "first pass"), "first pass");
   while (const auto keyframe = pass.next()) maximum.add(keyframe->max_confidence);
   return maximum.value();  // the mapping reports an error
+}
+
+/// Tells of the keyframes of a killed run, which are removed when this result is complete.
+void tellOfLeft(Job& job, const ResultFolder& folder) {
+  if (folder.left().empty()) return;
+  const std::string left = fmt::format("a run that did not end left {} keyframes in {}",
+                                       countKeyframes(folder.left()), folder.left().string());
+  if (job.resume) {  // no part of the result
+    if (job.note) job.note(left + ", which are removed when this result is complete");
+    return;
+  }
+  const bool can_resume =
+      !job.options.live.enabled && std::filesystem::exists(folder.left() / "session.mcap");
+  addWarning(job.report.warnings, "left-result",
+             "{}{}; they are removed when this result is complete", left,
+             can_resume
+                 ? fmt::format("; `event-fusion map {} --out {} --resume`, with the options of "
+                               "that run, goes on with them, after this one is stopped",
+                               fmt::join(namesOf(job.source), " "), job.out.string())
+                 : "");
 }
 
 /// Checks the folder of the result, takes the first look, and makes the folder.
@@ -321,26 +342,11 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   }
   folder.emplace(job.out, kind, job.stored ? job.stored->folder : std::filesystem::path());
   if (job.stored) job.stored->removeOthers(folder->path());
-  if (job.stored && has_session) {
+  if (job.stored) {
     const SessionFile file(folder->path() / "session.mcap");
     job.session = std::make_unique<SessionWriter>(file, job.stored->keyframes());
   }
-  if (folder->left().empty()) return look;
-  const std::string left = fmt::format("a run that did not end left {} keyframes in {}",
-                                       countKeyframes(folder->left()), folder->left().string());
-  if (job.resume) {  // no part of the result
-    if (job.note) job.note(left + ", which are removed when this result is complete");
-    return look;
-  }
-  const bool can_resume =
-      !job.options.live.enabled && std::filesystem::exists(folder->left() / "session.mcap");
-  addWarning(job.report.warnings, "left-result",
-             "{}{}; they are removed when this result is complete", left,
-             can_resume
-                 ? fmt::format("; `event-fusion map {} --out {} --resume`, with the options of "
-                               "that run, goes on with them, after this one is stopped",
-                               fmt::join(namesOf(job.source), " "), job.out.string())
-                 : "");
+  tellOfLeft(job, *folder);
   warnOfNew(job);
   return look;
 }

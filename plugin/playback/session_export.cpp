@@ -4,14 +4,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 
 #include "event_fusion/engine.h"
 #include "mapping/base/atomic_file.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/timestamp.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "plugin/options/option_file.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/results/output/simple_map.h"
 #include "plugin/results/pictures/map_picture.h"
 #include "plugin/session/map_quality.h"
@@ -23,26 +28,49 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Returns the options of a session as they were used.
-OptionReader optionsOf(const SessionFile& session) {
-  OptionReader reader;
-  const std::string file = session.path().string();
+/// Adds the options of a session that its map depends on, as they were used. Others may be of
+/// another machine or version.
+void readOptions(const SessionFile& session, OptionReader& reader) {
   for (const auto& [section, keys] : session.run().at("options").items()) {
     for (const auto& [key, value] : keys.items()) {
+      const std::string name = section + "." + key;
+      if (section != "map" && name != "fusion.late" && name != "checks.enabled" &&
+          name != "depth.min_probability") {
+        continue;
+      }
       reader.set(section, key, value.is_string() ? value.get<std::string>() : value.dump(),
-                 OptionOrigin{file});
+                 OptionOrigin{session.path().string(), {}});
     }
   }
-  return reader;
 }
 
-/// @throws std::invalid_argument if an option has no effect on stored keyframes.
-void requireUsable(const std::string& assignment) {
-  if (assignment.rfind("map.", 0) == 0 || assignment.rfind("depth.min_probability=", 0) == 0)
-    return;
-  throw std::invalid_argument("--set " + assignment +
-                              ": expected an option of [map], or depth.min_probability: the "
-                              "keyframes were made with the others (map RECORDING)");
+double minProbability(const EventFusionOptions& options) {
+  return options.mapper.keyframe.extraction.min_probability;
+}
+
+std::vector<std::unique_ptr<const SessionFile>> open(const SessionExport& what) {
+  std::vector<std::unique_ptr<const SessionFile>> sessions;
+  std::set<fs::path> known;
+  for (const fs::path& path : what.sessions) {
+    const fs::path file = sessionAt(path).value_or(path);
+    sessions.push_back(std::make_unique<const SessionFile>(file));
+    const SessionFile& session = *sessions.back();
+    if (session.keyframes() == 0)
+      throw std::runtime_error(file.string() + ": no keyframe is stored");
+    if (!known.insert(fs::canonical(file)).second) {
+      throw std::runtime_error(file.string() + ": given twice: expected each session once");
+    }
+    const Json& options = session.run().at("options");
+    const bool refines =
+        options.contains("refinement") && options["refinement"].value("enabled", false);
+    if (refines && what.refined && what.poses.empty() && session.generations() == 0) {
+      throw std::runtime_error(
+          file.string() +
+          ": its run did not end, and its poses are not refined yet: expected a "
+          "run that ended (map --resume), or --poses tracker");
+    }
+  }
+  return sessions;
 }
 
 /// Removes the depths that are not more probable.
@@ -55,11 +83,43 @@ void raiseProbability(double min_probability, DepthMap& map) {
   }
 }
 
+/// Returns T_world_ref of a session's keyframes from a file: see SessionExport::poses.
+/// @throws std::runtime_error naming a keyframe without a pose.
+std::vector<StampedPose> correctedPoses(const SessionFile& session, const fs::path& file,
+                                        const TrajectoryOptions& options) {
+  constexpr std::int64_t kSameNs = 1'000;
+  const std::vector<StampedPose> given = readPoses(file);
+  std::vector<StampedPose> T_world_ref = session.poses(false);
+  const auto isAt = [](const StampedPose& a, const StampedPose& b) {
+    return std::abs(a.t_ns - b.t_ns) <= kSameNs;
+  };
+  if (std::equal(given.begin(), given.end(), T_world_ref.begin(), T_world_ref.end(), isAt)) {
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      T_world_ref[i].T_world_rig = given[i].T_world_rig;
+    }
+    return T_world_ref;
+  }
+  Trajectory trajectory(options);
+  for (const StampedPose& pose : given) trajectory.add(pose);
+  for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
+    const std::optional<Rigid3> T_world_rig = trajectory.poseAt(T_world_ref[i].t_ns);
+    if (!T_world_rig) {
+      throw std::runtime_error(fmt::format(
+          "{}: no pose at {} s, the time of keyframe {}: it has {} poses from {} s to {} s",
+          file.string(), formatSeconds(T_world_ref[i].t_ns), i, given.size(),
+          formatSeconds(given.front().t_ns), formatSeconds(given.back().t_ns)));
+    }
+    T_world_ref[i].T_world_rig = *T_world_rig * session.keyframe(i).T_rig_ref;
+  }
+  return T_world_ref;
+}
+
 /// Adds the keyframes of sessions to a map, as a run does.
 class MapAgain {
  public:
-  explicit MapAgain(const EventFusionOptions& options)
-      : options_(options), cloud_(options.cloud, 0) {}
+  /// @param keeps whether the snapshot has the points of each keyframe.
+  MapAgain(const EventFusionOptions& options, bool keeps)
+      : options_(options), keeps_(keeps), cloud_(options.cloud, 0) {}
 
   /// @param T_world_ref the pose to use.
   void add(KeyframeDepthMap keyframe, const Rigid3& T_world_ref) {
@@ -69,8 +129,10 @@ class MapAgain {
     if (options_.checks) quality_.add(quality_.judge(keyframe, {}));
     std::vector<ViewPoint> points =
         options_.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe);
-    map_.keyframes.push_back(
-        {t_ns, T_world_ref, std::make_shared<const std::vector<ViewPoint>>(points)});
+    if (keeps_) {
+      map_.keyframes.push_back(
+          {t_ns, T_world_ref, std::make_shared<const std::vector<ViewPoint>>(points)});
+    }
     map_.trajectory.push_back({t_ns, T_world_ref});
     map_.tracker_trajectory.push_back({t_ns, keyframe.T_odom_ref});
     cloud_.insert(std::move(points), T_world_ref);
@@ -89,6 +151,7 @@ class MapAgain {
     for (; judged_ < end; ++judged_) {
       if (quality_.rightShareOf(judged_) >= options_.min_keyframe_quality) continue;
       cloud_.removePoints(judged_);
+      if (!keeps_) continue;
       map_.keyframes[judged_].points = std::make_shared<const std::vector<ViewPoint>>();
     }
   }
@@ -106,6 +169,7 @@ class MapAgain {
   }
 
   const EventFusionOptions& options_;
+  bool keeps_;
   RefinedCloud cloud_;
   QualityStatistics quality_;
   std::size_t judged_ = 0;
@@ -121,54 +185,96 @@ std::optional<fs::path> sessionAt(const fs::path& path) {
   return SessionFile::is(file) ? std::optional(file) : std::nullopt;
 }
 
-MapSnapshot mapOf(const SessionExport& what) {
-  std::vector<std::unique_ptr<const SessionFile>> sessions;
-  for (const fs::path& path : what.sessions) {
-    const auto file = sessionAt(path);
-    sessions.push_back(std::make_unique<const SessionFile>(file.value_or(path)));
-    if (sessions.back()->keyframes() == 0) {
-      throw std::runtime_error(sessions.back()->path().string() + ": there is no keyframe");
+EventFusionOptions optionsOf(const SessionExport& what) {
+  OptionReader reader;
+  double least = 0;
+  const auto sessions = open(what);
+  for (auto session = sessions.rbegin(); session != sessions.rend(); ++session) {  // the first wins
+    readOptions(**session, reader);
+    least = std::max(least, minProbability(reader.unchecked()));
+  }
+  reader.set(fmt::format("depth.min_probability={}", least));
+  for (const std::string& assignment : what.sets) {
+    const std::string name(trimmed(std::string_view(assignment).substr(0, assignment.find('='))));
+    if (name.rfind("map.", 0) != 0 && name != "depth.min_probability") {
+      throw std::invalid_argument("--set " + assignment +
+                                  ": expected an option of [map], or depth.min_probability: the "
+                                  "keyframes were made with the others (map RECORDING)");
+    }
+    reader.set(assignment);
+    if (reader.unchecked().automatic.voxel_size_m) {
+      throw std::invalid_argument("--set " + assignment + ": expected a number of metres");
     }
   }
-  OptionReader reader = optionsOf(*sessions.front());
-  const double made_with = reader.options().mapper.keyframe.extraction.min_probability;
-  for (const std::string& assignment : what.sets) {
-    requireUsable(assignment);
-    reader.set(assignment);
-  }
-  const EventFusionOptions options = reader.options();
-  const double min_probability = options.mapper.keyframe.extraction.min_probability;
-  if (min_probability < made_with) {
+  EventFusionOptions options = reader.options();
+  if (minProbability(options) < least) {
     throw std::invalid_argument(
         fmt::format("--set depth.min_probability={}: expected at least {}, with which the "
                     "keyframes were made",
-                    min_probability, made_with));
+                    minProbability(options), least));
   }
-  MapAgain map(options);
-  for (const auto& session : sessions) {
-    const std::vector<StampedPose> T_world_ref = session->poses(what.refined);
-    for (std::size_t i = 0; i < session->keyframes(); ++i) {
+  what.limits.validate();
+  if (sessions.size() > 1 && !what.poses.empty()) {
+    throw std::invalid_argument(
+        "--poses FILE: is for one session: correct each by itself (--store)");
+  }
+  return options;
+}
+
+MapSnapshot mapOf(const SessionExport& what, bool keeps_keyframes) {
+  const auto sessions = open(what);
+  const EventFusionOptions options = optionsOf(what);
+  MapAgain map(options, keeps_keyframes);
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    const SessionFile& session = *sessions[s];
+    std::vector<StampedPose> T_world_ref =
+        what.poses.empty() ? session.poses(what.refined)
+                           : correctedPoses(session, what.poses, options.mapper.trajectory);
+    if (what.store) SessionWriter::addGeneration(session, T_world_ref);
+    if (s > 0 && s <= what.T_first_this.size()) {
+      for (StampedPose& pose : T_world_ref) {
+        pose.T_world_rig = what.T_first_this[s - 1] * pose.T_world_rig;
+      }
+    }
+    for (std::size_t i = 0; i < session.keyframes(); ++i) {
       if (!what.limits.contain(T_world_ref[i].t_ns)) continue;
-      KeyframeDepthMap keyframe = session->keyframe(i);
-      if (min_probability > made_with) {
-        raiseProbability(min_probability, keyframe.map);
-        for (CameraDepthMap& of_one : keyframe.camera_maps) {
-          raiseProbability(min_probability, of_one.map);
-        }
+      KeyframeDepthMap keyframe = session.keyframe(i);
+      if (options.late_fusion && keyframe.camera_maps.empty()) {
+        throw std::runtime_error(session.path().string() +
+                                 ": has no maps of single cameras, which fusion.late needs");
+      }
+      raiseProbability(minProbability(options), keyframe.map);
+      for (CameraDepthMap& of_one : keyframe.camera_maps) {
+        raiseProbability(minProbability(options), of_one.map);
       }
       map.add(std::move(keyframe), T_world_ref[i].T_world_rig);
     }
   }
-  return map.finish(what.box);
+  MapSnapshot made = map.finish(what.box);
+  if (made.points->empty()) {
+    throw std::runtime_error(
+        fmt::format("there is no point: {} keyframes are chosen", made.trajectory.size()));
+  }
+  return made;
+}
+
+void requireEnding(const fs::path& out, const SessionExport& what) {
+  const std::string ending = out.extension().string();
+  if (ending != ".pcd" && ending != ".ply" && ending != ".simplemap") {
+    throw std::invalid_argument("--out " + out.string() +
+                                ": expected a name that ends with .pcd, .ply or .simplemap");
+  }
+  if (ending == ".simplemap" && what.box) {
+    throw std::invalid_argument(
+        "--box with .simplemap, which has whole keyframes: expected .pcd or "
+        ".ply");
+  }
 }
 
 MapSnapshot exportSession(const SessionExport& what, const fs::path& out) {
+  requireEnding(out, what);
   const std::string ending = out.extension().string();
-  if (ending != ".pcd" && ending != ".ply" && ending != ".simplemap") {
-    throw std::runtime_error(out.string() +
-                             ": expected a name that ends with .pcd, .ply or .simplemap");
-  }
-  MapSnapshot map = mapOf(what);
+  MapSnapshot map = mapOf(what, ending == ".simplemap");
   if (ending == ".pcd") writePcd(out, *map.points);
   if (ending == ".ply") writePly(out, *map.points, map.trajectory, upwardOf(map.trajectory));
   if (ending == ".simplemap") {

@@ -65,6 +65,7 @@ void findUsable(StoredRun& stored) {
     const bool is_new = timeOf(images / "depth.tiff") > newest - kWritten;
     if (!hasImages(images, keyframe, is_new) || keyframe.after_stop) return;
     stored.names.push_back(name);
+    stored.kernels.insert(keyframe.kernel);
   }
 }
 
@@ -114,7 +115,7 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
       difference = error.what() + std::string(": expected a file that can be read, or no --resume");
       continue;
     }
-    if (found.session->run().is_null() || found.session->keyframes() == 0) continue;
+    if (found.session->keyframes() == 0) continue;
     if (const auto differences = differencesOf(found.session->run(), run); !differences.empty()) {
       if (difference.empty()) {
         difference = fmt::format(

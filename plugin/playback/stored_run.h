@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct StoredRun {
   std::shared_ptr<const SessionFile> session;
   /// Folders of the first keyframes, which can be used: their images are whole, too.
   std::vector<std::string> names;
+  std::set<std::string> kernels;  ///< That made them.
   bool is_complete = false;  ///< The folder is OUT, and its run mapped the recording to its end.
 
   /// Returns the number of keyframes that can be used.

@@ -59,6 +59,7 @@ void visitFields(Keyframe& keyframe, ListsOf& lists, Visit&& visit) {
   visit("since_look", keyframe.blur_watch.since_look, "windows since the last of them");
   visit("pose_noise", keyframe.pose_noise, "stated by the tracker: m, rad; none: not stated");
   visit("after_stop", keyframe.after_stop, "1: made after the run was stopped");
+  visit("kernel", keyframe.kernel, "that made it: kernels may round differently");
   visit("events", keyframe.events, "that voted, per camera");
   visit("without_pose", keyframe.without_pose);
   visit("outside_lens", keyframe.outside_lens);
@@ -153,7 +154,7 @@ struct ListOf<std::vector<Number>> : std::true_type {};
 
 template <typename Field>
 std::string typeName() {
-  if constexpr (std::is_enum_v<Field>) {
+  if constexpr (std::is_enum_v<Field> || std::is_same_v<Field, std::string>) {
     return "string";
   } else if constexpr (std::is_same_v<Field, bool>) {
     return "uint8";
@@ -175,7 +176,8 @@ void add(CdrWriter& message, const Field& field) {
     message.add(nameOf(field));
   } else if constexpr (std::is_same_v<Field, bool>) {
     message.add(static_cast<std::uint8_t>(field));
-  } else if constexpr (std::is_arithmetic_v<Field> || ListOf<Field>::value) {
+  } else if constexpr (std::is_arithmetic_v<Field> || std::is_same_v<Field, std::string> ||
+                       ListOf<Field>::value) {
     message.add(field);
   } else {
     message.add(numbersIn(field));
@@ -198,6 +200,8 @@ template <typename Field>
 void take(ByteReader& body, Field& field) {
   if constexpr (std::is_enum_v<Field>) {
     field = fromName<Field>(takeText(body));
+  } else if constexpr (std::is_same_v<Field, std::string>) {
+    field = takeText(body);
   } else if constexpr (std::is_same_v<Field, bool>) {
     field = body.number<std::uint8_t>() != 0;
   } else if constexpr (std::is_arithmetic_v<Field>) {
@@ -359,6 +363,18 @@ KeyframeDepthMap keyframeOf(std::string_view message) {
                                                                 lists.positive_events[i]};
   }
   return keyframe;
+}
+
+KeyframePoses posesIn(std::string_view message) {
+  ByteReader body = bodyOf(message);
+  Window window;
+  KeyframePoses poses;
+  take(body, window.t0_ns);
+  take(body, window.t1_ns);
+  take(body, poses.t_ref_ns);
+  take(body, poses.T_world_ref);
+  take(body, poses.T_odom_ref);
+  return poses;
 }
 
 std::uint64_t logTime(std::int64_t t_ns) {

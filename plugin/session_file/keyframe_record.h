@@ -23,6 +23,14 @@ std::string keyframeMessage(const KeyframeDepthMap& keyframe);
 /// @throws std::runtime_error naming the field that is missing or cannot be.
 KeyframeDepthMap keyframeOf(std::string_view message);
 
+/// The poses of a keyframe.
+struct KeyframePoses {
+  std::int64_t t_ref_ns = 0;
+  Rigid3 T_world_ref, T_odom_ref;
+};
+/// Returns the poses of the message /efm/keyframe, without its images.
+KeyframePoses posesIn(std::string_view message);
+
 // Standard messages for viewers. Their times are limited to what ROS can say: 0 to 2^31 s.
 
 /// Returns the time of a message in the file.

@@ -57,6 +57,14 @@ Json identityOf(const fs::path& file, const std::string& name) {
   return {{"name", name}, {"bytes", size}, {"sha256", hash.finish()}};
 }
 
+/// Returns whether a name is that of a result's folder, or of the folders of its runs.
+bool isOneOf(const std::string& name, const std::string& out) {
+  for (const char* more : {"", ".partial", ".left", ".left.other", ".earlier", ".moving"}) {
+    if (name == out + more) return !out.empty();
+  }
+  return false;
+}
+
 /// Adds the files in a folder and those below it that a recording may be made of.
 void addFilesIn(const fs::path& folder, const fs::path& except, std::vector<fs::path>& files) {
   constexpr std::array<const char*, 12> kOthers = {".png",  ".jpg", ".jpeg", ".tif",
@@ -66,10 +74,9 @@ void addFilesIn(const fs::path& folder, const fs::path& except, std::vector<fs::
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const fs::path& path = entry.path();
     const std::string name = path.filename().string();
-    if (name.rfind(except.filename().string(), 0) == 0 && !except.empty() &&
-        fs::equivalent(folder, except.parent_path(), error)) {
-      continue;  // OUT, OUT.partial, …
-    }
+    const bool is_out = isOneOf(name, except.filename().string()) &&
+                        fs::equivalent(folder, except.parent_path(), error);
+    if (is_out || fs::exists(path / "run.lock", error)) continue;  // of a result
     const fs::file_status status = entry.symlink_status(error);
     if (fs::is_directory(status)) {
       addFilesIn(path, except, files);

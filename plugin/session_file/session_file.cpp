@@ -123,8 +123,8 @@ SessionFile::SessionFile(const std::filesystem::path& path) : file_(path, O_RDON
     }
     run_ = nlohmann::ordered_json::parse(messageText(messageIn(chunkAt(*run_chunk_), kRun)),
                                          nullptr, false);
-    if (!run_.is_object() || !run_.contains("session")) {
-      throw std::runtime_error("/efm/run: expected JSON with the key \"session\"");
+    if (!run_.is_object() || !run_.contains("session") || !run_.contains("options")) {
+      throw std::runtime_error("/efm/run: expected JSON with the keys \"session\" and \"options\"");
     }
     if (run_["session"] != kVersion) {
       throw std::runtime_error(
@@ -285,8 +285,8 @@ KeyframeDepthMap SessionFile::keyframe(std::size_t number) const {
 std::vector<StampedPose> SessionFile::poses(bool refined) const {
   std::vector<StampedPose> poses;
   for (std::size_t i = 0; i < keyframes(); ++i) {
-    const KeyframeDepthMap of = keyframe(i);
-    poses.push_back({of.window.t_ref_ns, refined ? of.T_world_ref : of.T_odom_ref});
+    const KeyframePoses of = posesIn(messageIn(chunkAt(keyframes_[i]), kKeyframe));
+    poses.push_back({of.t_ref_ns, refined ? of.T_world_ref : of.T_odom_ref});
   }
   if (!refined || poses_.empty()) return poses;
   const std::vector<Rigid3> newest = pathOf(messageIn(chunkAt(poses_.back()), kPoses));
@@ -326,22 +326,40 @@ SessionWriter::SessionWriter(const SessionFile& earlier, std::size_t keyframes)
     throw std::runtime_error(fmt::format("{}: {} keyframes: expected {}", earlier.path().string(),
                                          earlier.keyframes(), keyframes));
   }
-  mcap_.takeBegin();
   std::vector<std::uint64_t> chunks = {earlier.run_chunk_.value()};
   chunks.insert(chunks.end(), earlier.keyframes_.begin(),
                 earlier.keyframes_.begin() + static_cast<std::ptrdiff_t>(keyframes));
+  take(earlier, chunks);
+}
+
+/// Goes on behind some chunks of a file. What follows them is cut.
+void SessionWriter::take(const SessionFile& file, const std::vector<std::uint64_t>& chunks) {
+  mcap_.takeBegin();
   std::string index;
   for (const std::uint64_t position : chunks) {
-    const SessionFile::Chunk chunk = earlier.chunkAt(position);
+    const SessionFile::Chunk chunk = file.chunkAt(position);
     if (position != mcap_.position()) {
       throw std::runtime_error(
-          fmt::format("{}: byte {}: another version wrote it: expected a chunk "
-                      "at byte {}",
-                      earlier.path().string(), position, mcap_.position()));
+          fmt::format("{}: byte {}: another version wrote it: expected a chunk at byte {}",
+                      file.path().string(), position, mcap_.position()));
     }
     index = mcap_.takeChunk(chunk.fields, chunk.record_size, chunk.records);
   }
   file_.append(mcap_.position() - index.size(), index);  // the index of the last chunk may be torn
+}
+
+void SessionWriter::addGeneration(const SessionFile& file,
+                                  const std::vector<StampedPose>& T_world_ref) {
+  std::vector<std::uint64_t> chunks = {file.run_chunk_.value()};
+  for (const auto* more : {&file.keyframes_, &file.poses_}) {
+    chunks.insert(chunks.end(), more->begin(), more->end());
+  }
+  if (file.report_) chunks.push_back(*file.report_);
+  std::sort(chunks.begin(), chunks.end());
+  SessionWriter writer(file.path(), 0);
+  writer.take(file, chunks);
+  writer.addPoses(T_world_ref);
+  writer.mcap_.end();
 }
 
 void SessionWriter::add(const KeyframeDepthMap& keyframe) {

@@ -19,9 +19,6 @@
 
 namespace efm {
 
-/// The file of a map: all keyframes that it is made from, and how (docs/session.md). MCAP, one
-/// chunk per keyframe. The file only grows, so a crash costs at most the chunk in the making.
-
 /// An open file that is closed.
 class FileHandle {
  public:
@@ -45,7 +42,9 @@ class FileHandle {
   int file_;
 };
 
-/// A session file, for reading. Thread-safe.
+/// The file of a map, for reading: all keyframes that it is made from, and how (docs/session.md).
+/// MCAP, one chunk per keyframe. The file only grows, so a crash costs at most the chunk in the
+/// making. Thread-safe.
 class SessionFile {
  public:
   /// Finds the chunks: by the index, or if the run did not end, from the begin to the first byte
@@ -57,8 +56,8 @@ class SessionFile {
   static bool is(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return file_.path(); }
-  /// Returns how the map was made (docs/session.md, "run"); null if the run ended before its first
-  /// keyframe.
+  /// Returns how the map was made (docs/session.md, "run"); an empty object if the run ended before
+  /// its first keyframe.
   const nlohmann::ordered_json& run() const { return run_; }
   std::size_t keyframes() const { return keyframes_.size(); }
   /// Reads a keyframe. T_world_ref is the pose when it was made.
@@ -92,7 +91,7 @@ class SessionFile {
   std::string messageIn(const Chunk& chunk, int channel) const;
 
   FileHandle file_;
-  nlohmann::ordered_json run_;
+  nlohmann::ordered_json run_ = nlohmann::ordered_json::object();
   std::map<std::uint16_t, int> channels_;         // by their numbers in the file
   std::vector<std::uint64_t> keyframes_, poses_;  // chunks
   std::optional<std::uint64_t> run_chunk_, report_;
@@ -113,6 +112,8 @@ class SessionWriter {
   void addPoses(const std::vector<StampedPose>& T_world_ref);
   /// Adds the report and the index.
   void finish(const std::string& report_json);
+  /// Adds a generation of poses to a file, one per keyframe; all else stays.
+  static void addGeneration(const SessionFile& file, const std::vector<StampedPose>& T_world_ref);
 
   const std::filesystem::path& path() const { return file_.path(); }
   std::uint64_t bytes() const { return mcap_.position(); }
@@ -120,6 +121,7 @@ class SessionWriter {
 
  private:
   SessionWriter(const std::filesystem::path& path, int flags);
+  void take(const SessionFile& file, const std::vector<std::uint64_t>& chunks);
 
   FileHandle file_;
   McapFile mcap_;

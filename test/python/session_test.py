@@ -251,3 +251,32 @@ def test_the_map_of_a_session_is_that_of_a_new_run(name, tmp_path):
         program("export", first, *sets, "--out", tmp_path / file)
         assert (tmp_path / file).read_bytes() == (new / file).read_bytes(), file
     assert (first / "map.pcd").read_bytes() != (new / "map.pcd").read_bytes()
+
+
+def test_sessions_are_corrected_cut_and_merged(tmp_path):
+    plain = {**OPTIONS, "refinement.enabled": False}
+    whole = mapped(tmp_path / "whole", plain)
+    times = [float(line.split()[0]) for line in (whole / "trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    # By exact poses, the map of a tracker with errors is that of the keyframes at these poses.
+    noisy = tmp_path / "noisy"
+    words = [f"--set={key}={str(value).lower()}" for key, value in plain.items()]
+    program("map", DESK, "-q", "--out", noisy, *words, "--perturb", "tracker=poor", "--perturb", "seed=3")
+    before = ef.Session(noisy).poses()[1]
+    program("export", noisy, "--out", tmp_path / "fixed.pcd", "--poses", DESK + "/poses.txt", "--store")
+    session = ef.Session(noisy)
+    exact = ef.Session(whole).poses()[1]
+    assert np.allclose(session.poses()[1], exact, atol=1e-6) and not np.allclose(before, exact, atol=1e-3)
+    assert session.report["points"] > 0 and session.damage == "" and len(session) == len(times)
+    program("export", noisy, "--out", tmp_path / "stored.pcd")
+    assert (tmp_path / "stored.pcd").read_bytes() == (tmp_path / "fixed.pcd").read_bytes()
+    # Cut between two keyframes, and put together again.
+    middle = (times[len(times) // 2 - 1] + times[len(times) // 2]) / 2
+    program("export", whole, "--out", tmp_path / "early.pcd", "--t1", middle)
+    assert (tmp_path / "early.pcd").read_bytes() != (whole / "map.pcd").read_bytes()
+    # Two sessions, of which the second is where --transform says.
+    (tmp_path / "T.yaml").write_text("T_body_rig: [[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n")
+    text = program("export", whole, noisy, "--out", tmp_path / "two.pcd", "--transform", tmp_path / "T.yaml")
+    assert f"{2 * len(times)} keyframes" in text
+    box = program("export", whole, noisy, "--out", tmp_path / "second.pcd", "--transform", tmp_path / "T.yaml",
+                  "--box", "2.5,-9,-9,99,9,9", "--poses", "tracker")
+    assert " 0 points" not in box

@@ -69,13 +69,13 @@ void McapFile::finishChunk() {
   std::string bytes;
   appendMcapRecord(bytes, chunk, packed);
   const std::uint64_t begin = position_;
-  bytes += indexOf(chunk, bytes.size());
+  bytes += closeChunk(chunk, bytes.size());
   write_(begin, bytes);
   chunk_.clear();
 }
 
 /// Returns the records that follow the chunk at this position, and goes on behind them.
-std::string McapFile::indexOf(const McapChunk& chunk, std::uint64_t record_size) {
+std::string McapFile::closeChunk(const McapChunk& chunk, std::uint64_t record_size) {
   const std::uint64_t begin = position_ + record_size;
   std::string indexes;
   std::string positions;
@@ -106,7 +106,7 @@ std::string McapFile::takeChunk(const McapChunk& chunk, std::uint64_t record_siz
     const auto message = takeMcapFields<McapMessage>(record.content);
     note(message.channel, message.log_ns, position);
   }
-  return indexOf(chunk, record_size);
+  return closeChunk(chunk, record_size);
 }
 
 std::string McapFile::statistics() const {

@@ -166,7 +166,7 @@ class McapFile {
 
   std::string beginRecords() const;
   std::string channelRecords() const;
-  std::string indexOf(const McapChunk& chunk, std::uint64_t record_size);
+  std::string closeChunk(const McapChunk& chunk, std::uint64_t record_size);
   void note(std::uint16_t channel, std::uint64_t log_ns, std::uint64_t position);
   std::string statistics() const;
 

@@ -195,6 +195,8 @@ Kinds kindsOf(const fs::path& partial) {
 
 /// Gives an earlier result its place back, if a run ended while it replaced the result.
 void recover(const ResultFolder::Places& places) {
+  const fs::path other = places.left.string() + ".other";  // see takeStored
+  if (fs::exists(other) && !fs::exists(places.left)) fs::rename(other, places.left);
   if (fs::exists(places.moving)) {  // the run was moving the earlier result away
     moveResult(places.moving, places.target);
     removeResult(places.moving);
@@ -488,11 +490,15 @@ void ResultFolder::setAside() {
 void ResultFolder::takeStored(const fs::path& from) {
   if (from == places_.left) {
     const fs::path other = from.string() + ".other";
-    const bool has_other = countKeyframes(places_.partial) > 0;
-    if (has_other) fs::rename(places_.partial, other);
-    if (!has_other) removeResult(places_.partial);
-    fs::rename(from, places_.partial);
-    if (has_other) fs::rename(other, from);
+    if (countKeyframes(places_.partial) == 0) {
+      removeResult(places_.partial);
+      fs::rename(from, places_.partial);
+    } else if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, places_.partial.c_str(),
+                           RENAME_EXCHANGE) != 0) {  // the file system cannot exchange names
+      fs::rename(places_.partial, other);
+      fs::rename(from, places_.partial);
+      fs::rename(other, from);
+    }
     return lock();
   }
   setAside();

@@ -65,8 +65,8 @@ class ResultFolder {
   static std::vector<std::filesystem::path> storedIn(const std::filesystem::path& out);
 
   /// Makes the folder that is written to. No other run can do so until this object is destroyed.
-  /// @param resume one of `storedIn`, whose files are in the folder then: empty, none. OUT keeps
-  /// its own.
+  /// @param resume the folder to go on with, one of `storedIn`; empty: begin anew. Its files are
+  /// moved here; those of OUT are copied.
   /// @throws std::runtime_error naming the folder if it cannot be made, or another run is at work.
   ResultFolder(std::filesystem::path out, OutputKind kind,
                const std::filesystem::path& resume = {});

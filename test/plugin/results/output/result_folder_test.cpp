@@ -310,6 +310,12 @@ TEST_F(ResultFolderTest, OneRunAtATimeWritesAFolderAndTheFilesOfAKilledOneAreKep
   }
   EXPECT_TRUE(fs::exists(left)) << "that run made no result";
   EXPECT_FALSE(fs::exists(out));
+  {
+    ResultFolder stopped(out, OutputKind::kMap);
+    write(stopped.path(), resultOf("stopped"));
+    stopped.commit(false);
+  }
+  EXPECT_TRUE(fs::exists(left)) << "that run was stopped";
   run(out, "new");
   EXPECT_FALSE(fs::exists(left));
   EXPECT_EQ(filesBelow(folder()).size(), resultOf("new").size());
