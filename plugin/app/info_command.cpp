@@ -158,10 +158,6 @@ void printSystem() {
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// Prints what a session file has.
 void printSession(const std::filesystem::path& file, bool as_json) {
   using Json = nlohmann::ordered_json;

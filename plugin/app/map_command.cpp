@@ -168,10 +168,6 @@ class Watchers {
   double watched_s_ = 0;
 };
 
-}  // namespace
-
-namespace {
-
 /// @throws UsageError if the recording is a session, whose map is exported.
 void rejectSessions(const RecordingSource& source) {
   for (const std::filesystem::path& file : source.files) {

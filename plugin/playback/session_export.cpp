@@ -147,12 +147,9 @@ class MapAgain {
 
  private:
   void leaveOutBad(std::size_t end) {
-    if (options_.min_keyframe_quality <= 0) return;
-    for (; judged_ < end; ++judged_) {
-      if (quality_.rightShareOf(judged_) >= options_.min_keyframe_quality) continue;
-      cloud_.removePoints(judged_);
-      if (!keeps_) continue;
-      map_.keyframes[judged_].points = std::make_shared<const std::vector<ViewPoint>>();
+    for (const std::size_t bad : quality_.takeBad(end, options_.min_keyframe_quality)) {
+      cloud_.removePoints(bad);
+      if (keeps_) map_.keyframes[bad].points = std::make_shared<const std::vector<ViewPoint>>();
     }
   }
 
@@ -172,7 +169,6 @@ class MapAgain {
   bool keeps_;
   RefinedCloud cloud_;
   QualityStatistics quality_;
-  std::size_t judged_ = 0;
   MapSnapshot map_;
 };
 

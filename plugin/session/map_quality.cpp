@@ -154,6 +154,15 @@ double QualityStatistics::rightShareOf(std::size_t keyframe) {
   return rightShareOf(keyframe, usual_hits_);
 }
 
+std::vector<std::size_t> QualityStatistics::takeBad(std::size_t end, double min_share) {
+  std::vector<std::size_t> bad;
+  if (min_share <= 0) return bad;
+  for (; looked_at_ < end; ++looked_at_) {
+    if (rightShareOf(looked_at_) < min_share) bad.push_back(looked_at_);
+  }
+  return bad;
+}
+
 double QualityStatistics::rightShareOf(std::size_t keyframe, double usual_hits) const {
   // A tracker's jump separates a keyframe from one neighbour; a wrong keyframe agrees with none.
   // Pixels that lie beside those of its neighbours agree by chance, but they are few.

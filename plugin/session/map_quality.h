@@ -94,6 +94,9 @@ class QualityStatistics {
   /// and after it that were added. What is usual among all keyframes is up to a twentieth of the
   /// keyframes older: otherwise the cost of each would grow with their number.
   double rightShareOf(std::size_t keyframe);
+  /// Returns the keyframes below `end` whose fraction of right depths is lower than `min_share`;
+  /// each is looked at once. It is known when the next keyframe is added, or at the end.
+  std::vector<std::size_t> takeBad(std::size_t end, double min_share);
   std::size_t keyframes() const { return keyframes_.size(); }
 
   /// Returns the quality of all keyframes. Cost: linear in their number.
@@ -112,6 +115,7 @@ class QualityStatistics {
   KeyframeDepthMap last_;  // its depths, view and pose
   double usual_hits_ = 0;  // of the first `usual_of_` keyframes
   std::size_t usual_of_ = 0;
+  std::size_t looked_at_ = 0;  // by takeBad
 };
 
 }  // namespace efm

@@ -383,11 +383,9 @@ void MappingSession::forgetOldest() {
 /// Leaves the keyframes below `end` out of the map whose quality is too low. The quality of a
 /// keyframe is known when the next one is made.
 void MappingSession::leaveOutBad(std::size_t end) {
-  if (options_.min_keyframe_quality <= 0) return;
-  for (; num_judged_ < end; ++num_judged_) {
-    if (quality_.rightShareOf(num_judged_) >= options_.min_keyframe_quality) continue;
-    cloud_.removePoints(num_judged_);
-    left_out_.insert(num_judged_);
+  for (const std::size_t bad : quality_.takeBad(end, options_.min_keyframe_quality)) {
+    cloud_.removePoints(bad);
+    left_out_.insert(bad);
   }
 }
 

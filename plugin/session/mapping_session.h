@@ -181,7 +181,6 @@ class MappingSession {
   QualityFacts facts_;
   QualityStatistics quality_;
   mutable MapQuality map_quality_;                       // see mapQuality()
-  std::size_t num_judged_ = 0;                           // keyframes that are left out, or not
   std::set<std::size_t> left_out_;                       // keyframes without points in the cloud
   std::optional<std::variant<Jump, ClockReset>> break_;  // the input goes on behind it
   LiveStatus live_;                                      // breaks, rejected poses

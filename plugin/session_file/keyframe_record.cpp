@@ -185,7 +185,7 @@ void add(CdrWriter& message, const Field& field) {
 }
 
 ByteReader bodyOf(std::string_view message) {
-  ByteReader body(reinterpret_cast<const std::uint8_t*>(message.data()), message.size());
+  ByteReader body = readerOf(message);
   body.take(4);  // CDR's header: little-endian
   body.alignFromHere();
   return body;

@@ -39,10 +39,6 @@ std::runtime_error fileError(const std::filesystem::path& path, const char* doin
                                         why.empty() ? std::strerror(error) : why));
 }
 
-ByteReader readerOf(std::string_view bytes) {
-  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
-}
-
 /// Returns the number of a channel in the order of `topics`; 0 for an unknown topic.
 int channelOf(std::string_view topic) {
   const std::vector<McapTopic> all = topics();

@@ -16,10 +16,6 @@
 namespace efm {
 namespace {
 
-ByteReader readerOf(std::string_view bytes) {
-  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
-}
-
 std::int64_t logTime(std::uint64_t t_ns) {
   if (t_ns < static_cast<std::uint64_t>(kEndOfTimeNs)) return static_cast<std::int64_t>(t_ns);
   throw std::runtime_error(

@@ -141,6 +141,10 @@ Record takeMcapFields(ByteReader& content) {
   return record;
 }
 
+inline ByteReader readerOf(std::string_view bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
 struct McapRecord {
   McapOp op;
   ByteReader content;

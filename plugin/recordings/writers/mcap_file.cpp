@@ -98,7 +98,7 @@ std::string McapFile::closeChunk(const McapChunk& chunk, std::uint64_t record_si
 
 std::string McapFile::takeChunk(const McapChunk& chunk, std::uint64_t record_size,
                                 std::string_view records) {
-  ByteReader reader(reinterpret_cast<const std::uint8_t*>(records.data()), records.size());
+  ByteReader reader = readerOf(records);
   while (reader.remaining() > 0) {
     const std::uint64_t position = reader.position();
     McapRecord record = takeMcapRecord(reader);
