@@ -25,7 +25,6 @@
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/session/session_status.h"
-#include "plugin/session_file/session_file.h"
 
 namespace efm {
 int runImport(const ImportArguments& arguments) {
@@ -138,22 +137,6 @@ void requireNew(const ExportArguments& arguments) {
                            ": it exists: expected the name of a new file or folder");
 }
 
-/// Returns the limits of keyframes. "+3" counts from the first keyframe of the first session.
-TimeLimits limitsIn(const std::vector<std::filesystem::path>& sessions,
-                    const TimeArguments& times) {
-  TimeLimits limits;
-  const auto first_ns = [&] {
-    return SessionFile(sessionAt(sessions.front()).value()).poses(false).front().t_ns;
-  };
-  const auto resolved = [&](const TimeArgument& time) {
-    return time.ns + (time.from_start ? first_ns() : 0);
-  };
-  if (times.t0) limits.t0_ns = resolved(*times.t0);
-  if (times.t1) limits.t1_ns = resolved(*times.t1);
-  if (times.duration_ns) limits.t1_ns = limits.t0_ns.value_or(first_ns()) + *times.duration_ns;
-  return limits;
-}
-
 /// Writes the map of sessions.
 int exportSessions(const ExportArguments& arguments) {
   const RecordingSource& source = arguments.source;
@@ -166,7 +149,7 @@ int exportSessions(const ExportArguments& arguments) {
   SessionExport what;
   what.sessions = source.files;
   what.sets = arguments.sets;
-  what.limits = limitsIn(source.files, arguments.times);
+  what.limits = RecordingTimes(source).resolve(arguments.times);
   const std::string poses = source.poses.string();
   what.refined = poses != "tracker";
   if (!poses.empty() && poses != "refined" && poses != "tracker") what.poses = source.poses;
@@ -216,11 +199,10 @@ int runExport(const ExportArguments& arguments) {
     }
   }
   if (arguments.format.empty()) {
-    const std::string ending = arguments.out.extension().string();
-    const bool is_map = ending == ".pcd" || ending == ".ply" || ending == ".simplemap";
-    throw UsageError(is_map ? files.front().string() +
-                                  ": no session of a map: expected a session.mcap or its folder"
-                            : "--to is required; see event-fusion export --help");
+    throw UsageError(isMapFile(arguments.out)
+                         ? files.front().string() +
+                               ": no session of a map: expected a session.mcap or its folder"
+                         : "--to is required; see event-fusion export --help");
   }
   requireNew(arguments);
   RecordingSource source = arguments.source;

@@ -168,8 +168,7 @@ void printSession(const std::filesystem::path& file, bool as_json) {
                {"version", run.value("version", "")},
                {"keyframes", session.keyframes()},
                {"generations", session.generations()},
-               {"complete",
-                report.is_object() && !report.contains("stopped_at") && !report.contains("error")}};
+               {"complete", session.isComplete()}};
   if (session.keyframes() > 0) {
     info["first_s"] = formatSeconds(session.keyframe(0).window.t_ref_ns);
     info["last_s"] = formatSeconds(session.keyframe(session.keyframes() - 1).window.t_ref_ns);

@@ -8,7 +8,9 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/program.h"
+#include "plugin/playback/session_export.h"
 #include "plugin/session/session_status.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 
@@ -26,6 +28,10 @@ bool failStrictly(const std::vector<Warning>& warnings) {
 
 std::int64_t RecordingTimes::start() {
   if (start_ns_) return *start_ns_;
+  if (const auto session = sessionAt(source_.files.front())) {
+    start_ns_ = SessionFile(*session).keyframe(0).window.t_ref_ns;
+    return *start_ns_;
+  }
   RecordingSource events;  // their times need neither poses nor transforms
   events.files = source_.files;
   events.format = source_.format;

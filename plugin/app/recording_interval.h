@@ -36,7 +36,7 @@ struct TimeArguments {
 };
 
 /// Converts times of the command line to the recording's clock. Opens the recording at most once,
-/// and only if a time counts from its first event.
+/// and only if a time counts from its first event (of a session: from its first keyframe).
 class RecordingTimes {
  public:
   explicit RecordingTimes(RecordingSource source) : source_(std::move(source)) {}

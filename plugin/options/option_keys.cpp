@@ -216,6 +216,14 @@ nlohmann::ordered_json asJson(const EventFusionOptions& options) {
   return json;
 }
 
+nlohmann::ordered_json asJson(const std::vector<ChosenOption>& chosen) {
+  auto json = nlohmann::ordered_json::array();
+  for (const ChosenOption& option : chosen) {
+    json.push_back({{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
+  }
+  return json;
+}
+
 bool isOptionSection(std::string_view section) {
   const std::vector<NamedOption> all = listOptions({});
   return std::any_of(all.begin(), all.end(),

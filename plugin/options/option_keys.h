@@ -120,6 +120,8 @@ bool setOption(EventFusionOptions& options, std::string_view section, std::strin
                std::string_view text, const std::filesystem::path& folder);
 /// Returns all options: an object of sections, which are objects of keys.
 nlohmann::ordered_json asJson(const EventFusionOptions& options);
+/// Returns a list of objects with key, value and reason.
+nlohmann::ordered_json asJson(const std::vector<ChosenOption>& chosen);
 /// Returns whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 

@@ -341,8 +341,8 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
     if (job.stored->is_complete) return look;
   }
   folder.emplace(job.out, kind, job.stored ? job.stored->folder : std::filesystem::path());
-  if (job.stored) job.stored->removeOthers(folder->path());
   if (job.stored) {
+    job.stored->removeOthers(folder->path());
     const SessionFile file(folder->path() / "session.mcap");
     job.session = std::make_unique<SessionWriter>(file, job.stored->keyframes());
   }

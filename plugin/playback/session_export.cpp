@@ -48,8 +48,10 @@ double minProbability(const EventFusionOptions& options) {
   return options.mapper.keyframe.extraction.min_probability;
 }
 
-std::vector<std::unique_ptr<const SessionFile>> open(const SessionExport& what) {
-  std::vector<std::unique_ptr<const SessionFile>> sessions;
+using Sessions = std::vector<std::unique_ptr<const SessionFile>>;
+
+Sessions open(const SessionExport& what) {
+  Sessions sessions;
   std::set<fs::path> known;
   for (const fs::path& path : what.sessions) {
     const fs::path file = sessionAt(path).value_or(path);
@@ -181,10 +183,11 @@ std::optional<fs::path> sessionAt(const fs::path& path) {
   return SessionFile::is(file) ? std::optional(file) : std::nullopt;
 }
 
-EventFusionOptions optionsOf(const SessionExport& what) {
+namespace {
+
+EventFusionOptions optionsOf(const SessionExport& what, const Sessions& sessions) {
   OptionReader reader;
   double least = 0;
-  const auto sessions = open(what);
   for (auto session = sessions.rbegin(); session != sessions.rend(); ++session) {  // the first wins
     readOptions(**session, reader);
     least = std::max(least, minProbability(reader.unchecked()));
@@ -217,9 +220,13 @@ EventFusionOptions optionsOf(const SessionExport& what) {
   return options;
 }
 
+}  // namespace
+
+EventFusionOptions optionsOf(const SessionExport& what) { return optionsOf(what, open(what)); }
+
 MapSnapshot mapOf(const SessionExport& what, bool keeps_keyframes) {
-  const auto sessions = open(what);
-  const EventFusionOptions options = optionsOf(what);
+  const Sessions sessions = open(what);
+  const EventFusionOptions options = optionsOf(what, sessions);
   MapAgain map(options, keeps_keyframes);
   for (std::size_t s = 0; s < sessions.size(); ++s) {
     const SessionFile& session = *sessions[s];
@@ -254,13 +261,17 @@ MapSnapshot mapOf(const SessionExport& what, bool keeps_keyframes) {
   return made;
 }
 
-void requireEnding(const fs::path& out, const SessionExport& what) {
+bool isMapFile(const fs::path& out) {
   const std::string ending = out.extension().string();
-  if (ending != ".pcd" && ending != ".ply" && ending != ".simplemap") {
+  return ending == ".pcd" || ending == ".ply" || ending == ".simplemap";
+}
+
+void requireEnding(const fs::path& out, const SessionExport& what) {
+  if (!isMapFile(out)) {
     throw std::invalid_argument("--out " + out.string() +
                                 ": expected a name that ends with .pcd, .ply or .simplemap");
   }
-  if (ending == ".simplemap" && what.box) {
+  if (out.extension() == ".simplemap" && what.box) {
     throw std::invalid_argument(
         "--box with .simplemap, which has whole keyframes: expected .pcd or "
         ".ply");

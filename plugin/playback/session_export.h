@@ -53,7 +53,9 @@ EventFusionOptions optionsOf(const SessionExport& what);
 /// @throws as `optionsOf`, and if there is no point.
 MapSnapshot mapOf(const SessionExport& what, bool keeps_keyframes);
 
-/// @throws std::invalid_argument unless `exportSession` writes files with this ending.
+/// Returns whether `exportSession` writes files with this ending.
+bool isMapFile(const std::filesystem::path& out);
+/// @throws std::invalid_argument unless `exportSession` writes such a map to a file of this name.
 void requireEnding(const std::filesystem::path& out, const SessionExport& what);
 /// Writes the map of sessions. The ending of `out` decides: .pcd, .ply, .simplemap, as `map` writes
 /// them. @return the map. @throws as `mapOf` and `requireEnding`.

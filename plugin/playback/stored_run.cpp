@@ -133,9 +133,7 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
     notes.push_back(job.out.string() + ": no keyframe is stored: the map begins anew");
     return best;
   }
-  const Json report = Json::parse(best->session->report(), nullptr, false);
-  best->is_complete = best->folder == folders.front() && report.is_object() &&
-                      !report.contains("error") && !report.contains("stopped_at") &&
+  best->is_complete = best->folder == folders.front() && best->session->isComplete() &&
                       fs::exists(best->folder / "report.json");
   if (best->is_complete) {
     notes.push_back(job.out.string() + " is complete: nothing to do");

@@ -95,11 +95,6 @@ void visitFields(Keyframe& keyframe, ListsOf& lists, Visit&& visit) {
 
 using Numbers = std::vector<double>;
 
-Numbers numbersIn(const Rigid3& T) {
-  const Eigen::Vector3d& p = T.translation;
-  const Eigen::Quaterniond& q = T.rotation;
-  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-}
 bool setNumbers(const Numbers& numbers, Rigid3& T) {
   if (numbers.size() != 7) return false;
   T = {Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]),
@@ -306,6 +301,12 @@ void addPose(CdrWriter& message, const Rigid3& T) {
 }
 
 }  // namespace
+
+std::vector<double> numbersIn(const Rigid3& T) {
+  const Eigen::Vector3d& p = T.translation;
+  const Eigen::Quaterniond& q = T.rotation;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
 
 std::string keyframeSchema() {
   std::string schema;

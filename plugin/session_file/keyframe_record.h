@@ -12,6 +12,9 @@
 /// Keyframes as ROS 2 messages in CDR, for a session file.
 namespace efm {
 
+/// Returns x y z qx qy qz qw.
+std::vector<double> numbersIn(const Rigid3& T);
+
 /// Returns the definition of the message /efm/keyframe: one line per field, in this project's
 /// terms.
 std::string keyframeSchema();

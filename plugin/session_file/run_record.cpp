@@ -16,6 +16,7 @@
 #include "event_fusion/engine.h"
 #include "mapping/base/number_bytes.h"
 #include "plugin/options/option_keys.h"
+#include "plugin/session_file/keyframe_record.h"
 
 namespace efm {
 namespace {
@@ -127,21 +128,16 @@ void addChosen(Json& run, const Rig& rig, const EventFusionOptions& options,
   Json& cameras = run["cameras"] = Json::array();
   for (const RigCamera& camera : rig.cameras) {
     const CameraModel& model = camera.model;
-    const Eigen::Vector3d& p = camera.T_rig_cam.translation;
-    const Eigen::Quaterniond& q = camera.T_rig_cam.rotation;
     cameras.push_back({{"width", model.width},
                        {"height", model.height},
                        {"intrinsics", {model.fx, model.fy, model.cx, model.cy}},
                        {"distortion_model", std::string(nameOf(model.distortion))},
                        {"distortion_coeffs", model.coefficients},
-                       {"T_rig_cam", {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}},
+                       {"T_rig_cam", numbersIn(camera.T_rig_cam)},
                        {"time_offset_ns", camera.time_offset_ns}});
   }
   run["options"] = asJson(options);
-  Json& reasons = run["chosen"] = Json::array();
-  for (const ChosenOption& option : chosen) {
-    reasons.push_back({{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
-  }
+  run["chosen"] = asJson(chosen);
   if (const auto maximum = options.mapper.keyframe.sequence_maximum) {
     run["sequence_maximum"] = *maximum;
   }

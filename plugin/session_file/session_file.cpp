@@ -193,8 +193,8 @@ void SessionFile::scan() {
       const auto head = headAt(position);
       if (!head) throw std::runtime_error(fmt::format("byte {}: the file is cut off", position));
       if (head->first == McapOp::kDataEnd) return;
-      std::string bytes = file_.read(position, head->second);
-      if (head->first == McapOp::kChunk) bytes = chunkAt(position).records;
+      const std::string bytes = head->first == McapOp::kChunk ? chunkAt(position).records
+                                                              : file_.read(position, head->second);
       ByteReader records = readerOf(bytes);
       while (records.remaining() > 0) {
         McapRecord record = takeMcapRecord(records);
@@ -269,7 +269,11 @@ std::string SessionFile::messageIn(const Chunk& chunk, int channel) const {
 }
 
 KeyframeDepthMap SessionFile::keyframe(std::size_t number) const {
-  const std::uint64_t position = keyframes_.at(number);
+  if (number >= keyframes()) {
+    throw std::runtime_error(
+        fmt::format("{}: keyframe {}: it has {}", path().string(), number, keyframes()));
+  }
+  const std::uint64_t position = keyframes_[number];
   try {
     return keyframeOf(messageIn(chunkAt(position), kKeyframe));
   } catch (const std::exception& error) {
@@ -298,6 +302,11 @@ std::vector<StampedPose> SessionFile::poses(bool refined) const {
 
 std::string SessionFile::report() const {
   return report_ ? messageText(messageIn(chunkAt(*report_), kReport)) : std::string();
+}
+
+bool SessionFile::isComplete() const {
+  const auto report = nlohmann::json::parse(this->report(), nullptr, false);
+  return report.is_object() && !report.contains("stopped_at") && !report.contains("error");
 }
 
 SessionWriter::SessionWriter(const std::filesystem::path& path, int flags)

@@ -70,6 +70,8 @@ class SessionFile {
   std::size_t generations() const { return poses_.size(); }
   /// Returns the content of report.json; empty if the run did not end.
   std::string report() const;
+  /// Returns whether the run mapped its recording to the end.
+  bool isComplete() const;
   /// Returns why the end of the file is not used: "byte 4117: …"; empty if it is whole.
   const std::string& damage() const { return damage_; }
 
@@ -115,7 +117,6 @@ class SessionWriter {
   /// Adds a generation of poses to a file, one per keyframe; all else stays.
   static void addGeneration(const SessionFile& file, const std::vector<StampedPose>& T_world_ref);
 
-  const std::filesystem::path& path() const { return file_.path(); }
   std::uint64_t bytes() const { return mcap_.position(); }
   double seconds() const { return seconds_; }  ///< Of `add`, with the waits for the disk.
 

@@ -170,14 +170,6 @@ Json asJson(const ReferenceView& view) {
 
 }  // namespace
 
-Json asJson(const std::vector<ChosenOption>& chosen) {
-  Json json = Json::array();
-  for (const ChosenOption& option : chosen) {
-    json.push_back({{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
-  }
-  return json;
-}
-
 Json asJson(const std::vector<Warning>& warnings) {
   Json json = Json::array();
   for (const Warning& warning : warnings) {

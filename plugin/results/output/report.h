@@ -119,8 +119,7 @@ void describePoints(const MapCloud& cloud, RunReport& report);
 /// used values) and version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const RunReport& report);
 
-/// Return lists of objects with the keys of the report: key, value and reason; name and text.
-nlohmann::ordered_json asJson(const std::vector<ChosenOption>& chosen);
+/// Returns a list of objects with name and text.
 nlohmann::ordered_json asJson(const std::vector<Warning>& warnings);
 
 /// Returns the peak memory of this process so far.
