@@ -106,7 +106,10 @@ GlobalCloud::Keyframe GlobalCloud::keyframeOf(const std::vector<CloudPoint>& poi
 std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoint>& points) const {
   std::vector<VoxelPoint> located;
   located.reserve(points.size());
-  for (const CloudPoint& point : points) located.push_back(voxelPointOf(point));
+  for (const CloudPoint& point : points) {
+    const VoxelPoint voxel = voxelPointOf(point);
+    if (voxel.index.x >= slab_begin_ && voxel.index.x < slab_end_) located.push_back(voxel);
+  }
   // The sort is stable: the points of a voxel are summed in their given order.
   std::stable_sort(located.begin(), located.end(),
                    [](const VoxelPoint& a, const VoxelPoint& b) { return a.index < b.index; });
@@ -266,6 +269,37 @@ void GlobalCloud::finalize(std::uint64_t below) {
   finalized_below_ = below;
 }
 
+void GlobalCloud::keepSlab(std::int64_t begin, std::int64_t end) {
+  slab_begin_ = begin;
+  slab_end_ = end;
+  /// Removes the others from sorted voxels, and from what is known of each.
+  const auto cut = [&](auto& voxels, auto& verdicts, const auto& index_of) {
+    const auto from = std::partition_point(
+        voxels.begin(), voxels.end(), [&](const auto& voxel) { return index_of(voxel).x < begin; });
+    const auto to = std::partition_point(
+        from, voxels.end(), [&](const auto& voxel) { return index_of(voxel).x < end; });
+    if (!verdicts.empty()) {
+      verdicts.erase(verdicts.begin() + (to - voxels.begin()), verdicts.end());
+      verdicts.erase(verdicts.begin(), verdicts.begin() + (from - voxels.begin()));
+    }
+    voxels.erase(to, voxels.end());
+    voxels.erase(voxels.begin(), from);
+  };
+  for (auto& [number, keyframe] : keyframes_) {
+    cut(keyframe.voxels, keyframe.verdicts, [](const Sums& sums) { return sums.index; });
+  }
+  std::vector<Verdicts> none;
+  cut(finalized_, none, [](const FinalizedVoxel& voxel) { return voxel.sums.index; });
+}
+
+std::optional<std::int64_t> GlobalCloud::middleX() const {
+  if (finalized_.empty()) return std::nullopt;
+  const std::int64_t first = finalized_.front().sums.index.x;
+  const std::int64_t middle = finalized_[finalized_.size() / 2].sums.index.x;
+  if (middle > first) return middle;
+  return finalized_.back().sums.index.x > first ? std::optional(first + 1) : std::nullopt;
+}
+
 std::size_t GlobalCloud::unfinalizedVoxels(std::uint64_t below) const {
   constexpr std::size_t kVoxelsPerKeyframe = 10;  // by memory
   std::size_t count = 0;
@@ -276,12 +310,16 @@ std::size_t GlobalCloud::unfinalizedVoxels(std::uint64_t below) const {
 }
 
 MapCloud::ConstPtr GlobalCloud::points(int min_keyframes) const {
+  return mapCloudOf(pointsInWorld(min_keyframes), options_.voxel_size_m);
+}
+
+std::vector<CloudPoint> GlobalCloud::pointsInWorld(int min_keyframes) const {
   std::vector<CloudPoint> points;
   visitVoxels(std::numeric_limits<std::uint64_t>::max(), [&](const MergedVoxel& voxel) {
     if (static_cast<std::int64_t>(voxel.support()) < min_keyframes) return;
     points.push_back(pointOf(voxel));
   });
-  return mapCloudOf(points, options_.voxel_size_m);
+  return points;
 }
 
 GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const {

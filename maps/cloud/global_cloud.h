@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <tuple>
@@ -106,10 +107,17 @@ class GlobalCloud {
   std::size_t finalizedVoxels() const { return finalized_.size(); }
   std::size_t unfinalizedVoxels(std::uint64_t below) const;
 
+  /// Keeps the voxels whose index x is in [begin, end) alone, from now on: a slab of a map that is
+  /// too large for the memory. Their points are those of the whole map, bit for bit.
+  void keepSlab(std::int64_t begin, std::int64_t end);
+  /// Returns an index x that halves the finalized voxels; std::nullopt if they have a single one.
+  std::optional<std::int64_t> middleX() const;
+
   /// Returns the points with a support of at least `min_keyframes`, sorted by voxel (x, y, z).
   /// Cost: merging the voxels of all keyframes.
   MapCloud::ConstPtr points() const { return points(options_.min_keyframes); }
   MapCloud::ConstPtr points(int min_keyframes) const;
+  std::vector<CloudPoint> pointsInWorld(int min_keyframes) const;
 
   std::size_t keyframes() const { return finalized_keyframes_ + keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
@@ -189,6 +197,8 @@ class GlobalCloud {
   void visitVoxels(std::uint64_t below, const Visit& visit) const;
 
   GlobalCloudOptions options_;
+  std::int64_t slab_begin_ = std::numeric_limits<std::int64_t>::min();
+  std::int64_t slab_end_ = std::numeric_limits<std::int64_t>::max();
   std::map<std::uint64_t, Keyframe> keyframes_;  // by number; without the finalized keyframes
   std::vector<FinalizedVoxel> finalized_;        // sorted
   std::uint64_t finalized_below_ = 0;            // keyframes below this number are final

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <vector>
@@ -58,6 +59,9 @@ class RefinedCloud {
   /// Removes the points of a keyframe that is one of the last `GlobalCloud::kMaxNumberDifference`.
   /// It keeps its number and pose, and checks no other keyframe.
   void removePoints(std::size_t keyframe);
+
+  /// See GlobalCloud::keepSlab.
+  void keepSlab(std::int64_t begin, std::int64_t end) { cloud_.keepSlab(begin, end); }
 
   /// Requests new poses for keyframes, by their numbers. `applyPending` moves them. A request for a
   /// keyframe that cannot move any more is dropped: the keyframe keeps its last pose.

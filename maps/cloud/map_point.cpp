@@ -8,36 +8,45 @@
 #include <cmath>
 
 namespace efm {
-namespace {
 
-/// See `coarseStepOf`.
-/// @param position_of p_world of a point.
-template <typename Points, typename Position>
-std::optional<double> coarseStepIn(const Points& points, Position position_of,
-                                   double resolution_m) {
-  if (points.empty()) return std::nullopt;
-  std::vector<double> reaches;  // the largest coordinate of each point
-  reaches.reserve(points.size());
-  for (const auto& point : points) reaches.push_back(position_of(point).cwiseAbs().maxCoeff());
-  const auto at = reaches.end() - 1 - static_cast<std::ptrdiff_t>(reaches.size() / 1000);
-  std::nth_element(reaches.begin(), at, reaches.end());
-  return coarseStepAt(*at, resolution_m);
+CloudOrigin::CloudOrigin(double resolution_m)
+    : resolution_m_(resolution_m),
+      // The step of floats from x to 2 x is at most x / 2^23.
+      unit_m_(std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))))) {}
+
+void CloudOrigin::add(const std::vector<CloudPoint>& points) {
+  for (const CloudPoint& point : points) {
+    ++points_;
+    if (coarseStepAt(point.p_world.cwiseAbs().maxCoeff(), resolution_m_)) ++coarse_;
+    const Eigen::Array3d rounded = (point.p_world / unit_m_).array().round();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ++counts_[axis][rounded[static_cast<Eigen::Index>(axis)]];
+    }
+  }
 }
 
-/// Returns the origin of a cloud's points.
-Eigen::Vector3d originOf(const std::vector<CloudPoint>& points, double resolution_m) {
-  const auto position_of = [](const CloudPoint& point) { return point.p_world; };
-  if (!coarseStepIn(points, position_of, resolution_m)) return Eigen::Vector3d::Zero();
-  // The step of floats from x to 2 x is at most x / 2^23.
-  const double unit_m = std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))));
-  return (medianPosition(points) / unit_m).array().round() * unit_m;
+Eigen::Vector3f CloudOrigin::origin() const {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  if (coarse_ <= points_ / 1000) return origin.cast<float>();  // a few wrong points lie anywhere
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    auto median = counts_[axis].begin();
+    for (std::size_t below = median->second; below <= points_ / 2; below += median->second) {
+      ++median;
+    }
+    origin[static_cast<Eigen::Index>(axis)] = median->first * unit_m_;
+  }
+  return origin.cast<float>();
 }
-
-}  // namespace
 
 MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m) {
+  CloudOrigin origin(resolution_m);
+  origin.add(points);
+  return mapCloudAt(origin.origin(), points);
+}
+
+MapCloud::Ptr mapCloudAt(const Eigen::Vector3f& origin_m, const std::vector<CloudPoint>& points) {
   auto cloud = pcl::make_shared<MapCloud>();
-  cloud->sensor_origin_.head<3>() = originOf(points, resolution_m).cast<float>();
+  cloud->sensor_origin_.head<3>() = origin_m;
   const Eigen::Vector3d origin = cloud->sensor_origin_.head<3>().cast<double>();
   cloud->reserve(points.size());
   for (const CloudPoint& point : points) {
@@ -60,8 +69,13 @@ std::optional<double> coarseStepAt(double coordinate_m, double resolution_m) {
 }
 
 std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m) {
-  const auto position_of = [&](const MapPoint& point) { return positionIn(cloud, point); };
-  return coarseStepIn(cloud, position_of, resolution_m);
+  if (cloud.empty()) return std::nullopt;
+  std::vector<double> reaches;  // the largest coordinate of each point
+  reaches.reserve(cloud.size());
+  for (const MapPoint& p : cloud) reaches.push_back(positionIn(cloud, p).cwiseAbs().maxCoeff());
+  const auto at = reaches.end() - 1 - static_cast<std::ptrdiff_t>(reaches.size() / 1000);
+  std::nth_element(reaches.begin(), at, reaches.end());
+  return coarseStepAt(*at, resolution_m);
 }
 
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud) {

@@ -5,8 +5,11 @@
 #include <pcl/register_point_struct.h>
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -59,11 +62,27 @@ inline Eigen::Vector3d positionIn(const MapCloud& cloud, const MapPoint& point) 
   return cloud.sensor_origin_.head<3>().cast<double>() + point.getVector3fMap().cast<double>();
 }
 
-/// Returns the points in their order. If floats are too coarse for the points (`coarseStepOf`),
-/// their origin is the median position, rounded to a multiple of a power of ten that is fine enough
-/// itself. So it has few digits: PCL's programs write at most six.
-/// @param resolution_m for example the size of a voxel; above 0.
+/// Finds the origin for points of a cloud, which may come in parts: 0, or if floats are too coarse
+/// for them (`coarseStepOf`), their median position, rounded to a multiple of a power of ten that
+/// is fine enough itself. So it has few digits: PCL's programs write at most six.
+class CloudOrigin {
+ public:
+  /// @param resolution_m for example the size of a voxel; above 0.
+  explicit CloudOrigin(double resolution_m);
+  void add(const std::vector<CloudPoint>& points);
+  Eigen::Vector3f origin() const;
+
+ private:
+  double resolution_m_, unit_m_;
+  std::size_t points_ = 0;
+  std::size_t coarse_ = 0;                               // points for which floats are too coarse
+  std::array<std::map<double, std::size_t>, 3> counts_;  // per axis, by rounded coordinates
+};
+
+/// Returns the points in their order, with the origin of `CloudOrigin`.
 MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m);
+/// Returns the points in their order, relative to an origin of few digits.
+MapCloud::Ptr mapCloudAt(const Eigen::Vector3f& origin, const std::vector<CloudPoint>& points);
 
 /// Returns the step of floats at the world coordinates of a map, metres, if it is more than a tenth
 /// of the resolution: programs that use floats round these points. Considers 99.9 % of the points,

@@ -118,15 +118,22 @@ Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField
 }  // namespace
 
 void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
+  writePcdHeader(stream, cloud.size(), cloud.sensor_origin_.head<3>());
+  writePcdPoints(stream, cloud);
+}
+
+void writePcdHeader(std::ostream& stream, std::uint64_t points, const Eigen::Vector3f& origin) {
   NumberText header;
   header << "# .PCD v0.7 - Point Cloud Data file format\n"
             "VERSION 0.7\nFIELDS x y z intensity support sigma probability\n"
             "SIZE 4 4 4 4 4 4 4\n"
             "TYPE F F F F U F F\nCOUNT 1 1 1 1 1 1 1\nWIDTH "
-         << cloud.size() << "\nHEIGHT 1\nVIEWPOINT " << cloud.sensor_origin_.x() << " "
-         << cloud.sensor_origin_.y() << " " << cloud.sensor_origin_.z() << " 1 0 0 0\nPOINTS "
-         << cloud.size() << "\nDATA binary\n";
+         << points << "\nHEIGHT 1\nVIEWPOINT " << origin.x() << " " << origin.y() << " "
+         << origin.z() << " 1 0 0 0\nPOINTS " << points << "\nDATA binary\n";
   stream << header.str();
+}
+
+void writePcdPoints(std::ostream& stream, const MapCloud& cloud) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const MapPoint& point = cloud[i];
     if (!point.getVector3fMap().allFinite() || !std::isfinite(point.intensity)) {

@@ -36,6 +36,9 @@ PointCloudContent readPointCloud(const std::filesystem::path& path);
 
 /// Writes a binary PCD file, version 0.7.
 void writePcdTo(std::ostream& stream, const MapCloud& cloud);
+/// The parts of the same, for a cloud that comes in parts of one origin.
+void writePcdHeader(std::ostream& stream, std::uint64_t points, const Eigen::Vector3f& origin);
+void writePcdPoints(std::ostream& stream, const MapCloud& part);
 
 /// @throws std::runtime_error naming the line or byte, the value and the expected value.
 PointCloudContent parsePcd(std::string_view bytes);

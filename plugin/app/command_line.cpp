@@ -51,10 +51,10 @@ void addImport(CLI::App& app, Run& run) {
 }
 
 void addExport(CLI::App& app, Run& run) {
-  CLI::App& command =
-      *app.add_subcommand("export",
-                          "Write a recording for other tools: text, MCAP; or the map of sessions "
-                          "(session.mcap) again: .pcd, .ply, .simplemap");
+  CLI::App& command = *app.add_subcommand(
+      "export",
+      "Write a recording for other tools: text, MCAP; or the map of sessions "
+      "(session.mcap) again: .pcd, .ply, .html, .simplemap, .mcap, a folder colmap");
   auto arguments = argumentsOf(command, run, runExport);
   addSource(command, arguments->source);
   const auto name_example = [](const std::string& format) {
@@ -76,6 +76,9 @@ void addExport(CLI::App& app, Run& run) {
                   "read; once per session")
       ->type_name("FILE")
       ->allow_extra_args(false);
+  command.add_flag("--register", arguments->registers,
+                   "Sessions: correct the transforms by what the keyframes see: about 10 % of the "
+                   "scene's depth, and 6 degrees");
   command.add_flag("--store", arguments->store,
                    "Sessions: add the poses of --poses FILE to the session, for later exports");
   constexpr int kCorners = 6;

@@ -63,6 +63,7 @@ struct ExportArguments {
   std::vector<std::string> sets;                  ///< Of sessions: section.key=value.
   std::vector<double> box_m;                      ///< Of sessions: x0 y0 z0 x1 y1 z1, or empty.
   std::vector<std::filesystem::path> transforms;  ///< T_first_this of further sessions.
+  bool registers = false;                         ///< Register further sessions with the first.
   bool store = false;                             ///< Add the poses to the session.
 };
 
@@ -75,7 +76,7 @@ std::vector<std::string> exportFormats();
 int runExport(const ExportArguments& arguments);
 
 struct ViewArguments {
-  std::filesystem::path path;  ///< The folder of a map, or its map.html.
+  std::filesystem::path path;  ///< The folder of a map, its map.html, or a session.
 };
 
 /// `event-fusion view`: opens map.html with the system's program for pages (`xdg-open`, `open`),

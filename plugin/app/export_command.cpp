@@ -143,8 +143,7 @@ int exportSessions(const ExportArguments& arguments) {
   requireNew(arguments);
   if (!arguments.format.empty()) {
     throw UsageError("--to " + arguments.format +
-                     ": a session's map is exported: the ending of --out decides (.pcd, .ply, "
-                     ".simplemap)");
+                     ": a session's map is exported: the ending of --out decides: " + kMapFiles);
   }
   SessionExport what;
   what.sessions = source.files;
@@ -153,9 +152,12 @@ int exportSessions(const ExportArguments& arguments) {
   const std::string poses = source.poses.string();
   what.refined = poses != "tracker";
   if (!poses.empty() && poses != "refined" && poses != "tracker") what.poses = source.poses;
-  what.store = arguments.store;
-  if (what.store && what.poses.empty()) {
+  if (arguments.store && what.poses.empty()) {
     throw UsageError("--store: expected --poses FILE, whose poses are stored");
+  }
+  what.registers = arguments.registers;
+  if (what.registers && what.sessions.size() == 1) {
+    throw UsageError("--register: expected several sessions");
   }
   if (arguments.transforms.size() >= what.sessions.size()) {
     throw UsageError(
@@ -172,15 +174,25 @@ int exportSessions(const ExportArguments& arguments) {
       throw UsageError("--box: expected the lower corner first: X0,Y0,Z0,X1,Y1,Z1");
     }
   }
-  asUsage([&] {
-    requireEnding(arguments.out, what);
-    return optionsOf(what);
+  const SessionMap map = asUsage([&] {
+    requireMapFile(arguments.out, what);
+    return SessionMap(what);
   });
-  const MapSnapshot map = exportSession(what, arguments.out);
-  if (arguments.verbosity != Verbosity::kQuiet) {
-    fmt::print("{} keyframes, {} points, hash {}; written to {}\n", map.trajectory.size(),
-               map.points->size(), mapHash(*map.points), arguments.out.string());
+  const ExportedMap made = exportSession(map, arguments.out);
+  if (arguments.store) map.storePoses();
+  if (arguments.verbosity == Verbosity::kQuiet) return 0;
+  for (std::size_t i = 0; i < map.registrations().size(); ++i) {
+    const MapRegistration& found = map.registrations()[i];
+    fmt::print(
+        "{}: registered, moved {:.2g} cm (sigma {:.1g} cm) and {:.2g} degrees (sigma {:.1g}); {} "
+        "of "
+        "{} pairs of keyframes agree\n",
+        map.sessions()[i + 1]->path().string(), 100 * found.moved_m, 100 * found.sigma_m,
+        found.moved_rad / kRadiansPerDegree, found.sigma_rad / kRadiansPerDegree, found.pairs,
+        found.checked);
   }
+  fmt::print("{} keyframes, {} points, hash {}; written to {}\n", map.trajectory().size(),
+             made.points, made.hash, arguments.out.string());
   return 0;
 }
 
@@ -193,7 +205,8 @@ int runExport(const ExportArguments& arguments) {
   if (sessions > 0) throw UsageError("SOURCE: sessions and recordings: expected one of both kinds");
   for (const char* option :
        {arguments.sets.empty() ? "" : "--set", arguments.box_m.empty() ? "" : "--box",
-        arguments.transforms.empty() ? "" : "--transform", arguments.store ? "--store" : ""}) {
+        arguments.transforms.empty() ? "" : "--transform", arguments.store ? "--store" : "",
+        arguments.registers ? "--register" : ""}) {
     if (*option != '\0') {
       throw UsageError(std::string(option) + ": is for sessions (session.mcap of a map)");
     }

@@ -21,7 +21,7 @@
 #include "plugin/checks/health_checks.h"
 #include "plugin/playback/progress.h"
 #include "plugin/playback/recording_info.h"
-#include "plugin/playback/session_export.h"
+#include "plugin/playback/session_map.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/session/session_status.h"

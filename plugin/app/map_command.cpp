@@ -14,7 +14,7 @@
 #include "plugin/options/option_file.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/output_checks.h"
-#include "plugin/playback/session_export.h"
+#include "plugin/playback/session_map.h"
 #include "plugin/recordings/open/mrpt_library.h"
 
 namespace efm {

@@ -8,7 +8,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/program.h"
-#include "plugin/playback/session_export.h"
+#include "plugin/playback/session_map.h"
 #include "plugin/session/session_status.h"
 #include "plugin/session_file/session_file.h"
 

@@ -9,13 +9,28 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "plugin/playback/session_export.h"
 #include "plugin/results/output/result_folder.h"
 
 namespace efm {
 namespace {
 
+/// Makes the page of a session, beside it: session.html.
+std::filesystem::path pageOf(const std::filesystem::path& session) {
+  SessionExport what;
+  what.sessions = {session};
+  const SessionFile file(session);
+  what.refined = file.generations() > 0;
+  const std::filesystem::path page = std::filesystem::path(session).replace_extension(".html");
+  exportSession(SessionMap(what), page);
+  return std::filesystem::absolute(page).lexically_normal();
+}
+
 std::filesystem::path pageIn(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
+  if (const auto session = sessionAt(path); session && !fs::exists(path / "map.html")) {
+    return pageOf(*session);
+  }
   const bool is_unfinished = !fs::exists(path / "report.json") && ResultFolder::hasPartial(path);
   if (!fs::exists(path) && !is_unfinished) {
     throw std::runtime_error(path.string() + ": no such folder: expected one that `map` wrote");

@@ -196,6 +196,20 @@ std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map) {
   return keyframes;
 }
 
+std::vector<StampedPose> readSimpleMap(const std::filesystem::path& file) {
+  try {
+    mrpt::maps::CSimpleMap map;
+    if (!map.loadFromFile(file.string())) throw std::runtime_error("it is no simplemap");
+    std::vector<StampedPose> poses;
+    for (const StoredKeyframe& keyframe : keyframesOf(map)) {
+      poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
+    }
+    return poses;
+  } catch (const std::exception& error) {
+    throw std::runtime_error("cannot read " + file.string() + ": " + error.what());
+  }
+}
+
 using mrpt::maps::CSimplePointsMap;
 using mrpt::serialization::CArchive;
 

@@ -36,6 +36,9 @@ void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
                 const mrpt::maps::CPointsMapXYZI::Ptr& cloud);
 /// Returns the keyframes of a simplemap. A frame may have several keyframes.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
+/// Returns T_world_ref of the keyframes in a .simplemap. @throws std::runtime_error naming the
+/// file.
+std::vector<StampedPose> readSimpleMap(const std::filesystem::path& file);
 
 /// The global cloud as a metric map of MRPT. MRPT's map factory makes the map from an .ini. The map
 /// takes the keyframes' clouds of a simplemap, and it can be stored and drawn. Not thread-safe.

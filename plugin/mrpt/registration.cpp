@@ -35,4 +35,4 @@ const struct AtLoad {
 
 /// The functions that the program loads from this library.
 extern "C" const efm::MrptLibrary efmMrptLibrary = {efm::openRawlog, efm::writeRawlog,
-                                                    efm::recordFrames};
+                                                    efm::recordFrames, efm::readSimpleMap};

@@ -190,36 +190,57 @@ std::vector<std::string> differencesOf(const Json& before, const Json& now) {
   return differences;
 }
 
-std::string mapHash(const MapCloud& cloud) {
+struct MapHasher::State {
+  using Row = std::array<double, 7>;
+  Sha256 hash;
+  std::vector<Row> last;  ///< The points with the largest x: the next part may have others.
+
+  void add(const Row& row) {
+    std::string bytes;
+    for (const double value : row) appendLittleEndian(bytes, value);
+    hash.add(bytes);
+  }
+  void addLast() {
+    std::sort(last.begin(), last.end());
+    for (const Row& row : last) add(row);
+    last.clear();
+  }
+};
+
+MapHasher::MapHasher() : state_(new State) {}
+MapHasher::~MapHasher() = default;
+
+void MapHasher::add(const MapCloud& part) {
   const auto rowOf = [&](std::uint32_t index) {
-    const MapPoint& point = cloud[index];
-    const Eigen::Vector3d p_world = positionIn(cloud, point);
-    std::array<double, 7> row = {p_world.x(),          p_world.y(), p_world.z(),
-                                 point.intensity,      point.sigma, point.probability,
-                                 double(point.support)};
+    const MapPoint& point = part[index];
+    const Eigen::Vector3d p_world = positionIn(part, point);
+    State::Row row = {p_world.x(), p_world.y(),       p_world.z(),          point.intensity,
+                      point.sigma, point.probability, double(point.support)};
     for (double& value : row) {
       if (std::isnan(value)) value = -1;  // not known; NaN has many forms, and no order
       if (value == 0) value = 0;          // no negative zero
     }
     return row;
   };
-  std::vector<std::uint32_t> order(cloud.size());
+  std::vector<std::uint32_t> order(part.size());
   std::iota(order.begin(), order.end(), 0U);
-  const auto xyzOf = [&](std::uint32_t index) {
-    const MapPoint& point = cloud[index];
-    return std::array<float, 3>{point.x, point.y, point.z};
-  };
-  tbb::parallel_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto xyz_a = xyzOf(a), xyz_b = xyzOf(b);
-    return xyz_a != xyz_b ? xyz_a < xyz_b : rowOf(a) < rowOf(b);
-  });
-  Sha256 hash;
-  std::string bytes;
+  tbb::parallel_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return part[a].x < part[b].x; });
   for (const std::uint32_t index : order) {
-    bytes.clear();
-    for (const double value : rowOf(index)) appendLittleEndian(bytes, value);
-    hash.add(bytes);
+    const State::Row row = rowOf(index);
+    if (!state_->last.empty() && state_->last.back()[0] < row[0]) state_->addLast();
+    state_->last.push_back(row);
   }
+}
+
+std::string MapHasher::finish() {
+  state_->addLast();
+  return state_->hash.finish();
+}
+
+std::string mapHash(const MapCloud& cloud) {
+  MapHasher hash;
+  hash.add(cloud);
   return hash.finish();
 }
 

@@ -4,10 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "mapping/geometry/rig.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/session/event_fusion_options.h"
 
 namespace efm {
@@ -31,5 +33,18 @@ nlohmann::ordered_json fingerprintOf(const std::vector<std::filesystem::path>& i
 /// @param before, now `SessionFile::run`.
 std::vector<std::string> differencesOf(const nlohmann::ordered_json& before,
                                        const nlohmann::ordered_json& now);
+
+/// `mapHash` of a cloud that comes in parts: no point of a part has a smaller x than one before it.
+class MapHasher {
+ public:
+  MapHasher();
+  ~MapHasher();
+  void add(const MapCloud& part);
+  std::string finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace efm

@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/sample.h"
 
@@ -33,6 +35,9 @@ struct MrptLibrary {
                                                const Recording& recording);
   /// See `recordFrames` (plugin/mrpt/window/map_scene.h).
   std::unique_ptr<MapWatcher> (*recordFrames)(const std::filesystem::path& folder, bool force);
+  /// Returns T_world_ref of the keyframes of a .simplemap.
+  /// @throws std::runtime_error naming the file.
+  std::vector<StampedPose> (*readSimpleMap)(const std::filesystem::path& file);
 };
 
 /// Loads the library: from the folder of libevent-fusion.so, else with the system's search.
