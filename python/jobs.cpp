@@ -18,6 +18,7 @@
 #include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/playback/map_job.h"
 #include "plugin/playback/recording_info.h"
+#include "plugin/playback/session_export.h"
 #include "plugin/session_file/session_file.h"
 
 namespace efm {
@@ -168,6 +169,56 @@ py::object storedPoses(const SessionFile& file, bool refined) {
   return posesOf(poses);
 }
 
+/// @param box x0 y0 z0 x1 y1 z1, or empty. @param T_first_this of further sessions: matrices.
+std::unique_ptr<SessionMap> sessionMapOf(std::vector<Path> sessions, std::vector<std::string> sets,
+                                         std::optional<std::int64_t> t0_ns,
+                                         std::optional<std::int64_t> t1_ns,
+                                         const std::vector<double>& box, bool refined,
+                                         const Path& poses, const std::vector<Array>& T_first_this,
+                                         bool registers) {
+  SessionExport what;
+  what.sessions = std::move(sessions);
+  what.sets = std::move(sets);
+  what.limits = {t0_ns, t1_ns};
+  what.refined = refined;
+  what.poses = poses;
+  what.registers = registers;
+  for (const Array& T : T_first_this) what.T_first_this.emplace_back(rigidOf(T, "transforms"));
+  if (!box.empty()) what.box = Box::of(box);
+  const Released released;
+  return std::make_unique<SessionMap>(std::move(what));
+}
+
+py::list registrationsOf(const SessionMap& map) {
+  py::list all;
+  for (const MapRegistration& found : map.registrations()) {
+    py::dict one;
+    one["T_first_this"] = arrayOf(matrixOf(*map.what().T_first_this[all.size()]));
+    one["moved_m"] = found.moved_m;
+    one["moved_deg"] = found.moved_rad / kRadiansPerDegree;
+    one["sigma_m"] = found.sigma_m;
+    one["sigma_deg"] = found.sigma_rad / kRadiansPerDegree;
+    one["pairs"] = found.pairs;
+    one["checked"] = found.checked;
+    all.append(one);
+  }
+  return all;
+}
+
+py::array sessionPoints(const SessionMap& map) {
+  MapSnapshot made;
+  {
+    const Released released;
+    made = map.snapshot(false);
+  }
+  return pointsOf(*made.points);
+}
+
+void exportMap(const SessionMap& map, const Path& out) {
+  requireMapFile(out, map.what());
+  exportSession(map, out);
+}
+
 std::string depthErrorJson(const Path& estimate, const Path& truth, int tolerance_px,
                            std::optional<double> max_depth_m, std::optional<double> png_scale,
                            const Path& mask, const std::vector<double>& thresholds_m,
@@ -255,10 +306,15 @@ void defineJobs(py::module_& module) {
           },
           releases)
       .def("poses", &storedPoses)
-      .def_property_readonly(
-          "run", [](const SessionFile& f) { return f.run().dump(); })
+      .def_property_readonly("run", [](const SessionFile& f) { return f.run().dump(); })
       .def_property_readonly("report", &SessionFile::report)
       .def_property_readonly("damage", &SessionFile::damage);
+  py::class_<SessionMap>(module, "SessionMap")
+      .def(py::init(&sessionMapOf))
+      .def("points", &sessionPoints)
+      .def("export", &exportMap, releases)
+      .def("store_poses", &SessionMap::storePoses, releases)
+      .def_property_readonly("registrations", &registrationsOf);
   module.def("run_dsi", &mapDsi);
   PYBIND11_NUMPY_DTYPE_EX(PixelEvidence<CandidateInputs>, x, "x", y, "y", depth_m, "depth", sigma_m,
                           "sigma", probability, "probability", inputs, "inputs");

@@ -14,11 +14,15 @@
 namespace efm {
 namespace {
 
+constexpr int kRounds = 3;
 constexpr std::size_t kPartners = 3;  // of each keyframe
-constexpr std::size_t kMinMapPairs = 3;
-constexpr double kDepthShare = 0.03;  // the expected displacement, by the scene's depth
+constexpr std::size_t kMinMapPairs = 2;
+/// The expected displacement: a share of the scene's depth, and an angle.
+constexpr double kDepthShare = 0.03;
 constexpr double kSigmaRad = 2 * kRadiansPerDegree;
-constexpr double kAgreeSigmas = 3;
+/// Lower than for loops: views of a forward motion share few points, and pairs must agree.
+constexpr double kMinInliers = 0.15;
+constexpr double kAgreeSigmas = 4.5;  // 1 of 400 errors of six numbers is larger
 
 /// Returns the matrix A for which a small motion d, right of X, is A d right of X * T.
 Matrix6d adjointOf(const Rigid3& T) {
@@ -30,12 +34,12 @@ Matrix6d adjointOf(const Rigid3& T) {
 }
 
 /// Returns the indices of the keyframes that see most of a keyframe.
-std::vector<std::size_t> partnersOf(const PosedCloud& keyframe, const std::vector<PosedCloud>& in,
-                                    double min_overlap) {
+std::vector<std::size_t> partnersOf(const RegistrationCloud& keyframe, const Rigid3& T_world_ref,
+                                    const std::vector<PosedCloud>& in, double min_overlap) {
   std::vector<std::pair<double, std::size_t>> overlaps;
   for (std::size_t i = 0; i < in.size(); ++i) {
-    const double overlap = viewOverlap(keyframe.cloud, in[i].cloud,
-                                       in[i].T_world_ref.inverse() * keyframe.T_world_ref);
+    const double overlap =
+        viewOverlap(keyframe, in[i].cloud, in[i].T_world_ref.inverse() * T_world_ref);
     if (overlap >= min_overlap) overlaps.emplace_back(-overlap, i);
   }
   std::sort(overlaps.begin(), overlaps.end());
@@ -46,73 +50,96 @@ std::vector<std::size_t> partnersOf(const PosedCloud& keyframe, const std::vecto
   return partners;
 }
 
+/// The pairs of keyframes that fit on each other, in a graph of poses. The last one is that of the
+/// moved map about its middle; the others are fixed.
+struct Pairs {
+  PoseGraph graph;
+  std::size_t checked = 0;
+};
+
+/// @param T_fixed_moved what is known so far.
+Pairs pairsOf(const std::vector<PosedCloud>& fixed, const std::vector<PosedCloud>& moved,
+              const Rigid3& T_moved_middle, const Rigid3& T_fixed_moved) {
+  Pairs pairs;
+  for (const PosedCloud& keyframe : fixed) {
+    pairs.graph.T_world_node.push_back(keyframe.T_world_ref);
+  }
+  pairs.graph.fixed.assign(fixed.size(), true);
+  pairs.graph.T_world_node.push_back(T_fixed_moved * T_moved_middle);
+  pairs.graph.fixed.push_back(false);
+  for (const PosedCloud& keyframe : moved) {
+    const double depth_m = 1 / std::max(keyframe.cloud.middleInverseDepth(), 1e-9);
+    LoopOptions options;
+    options.loop_min_inliers = kMinInliers;
+    options.loop_max_sigma_m = std::max(options.loop_max_sigma_m, kDepthShare * depth_m / 3);
+    Matrix6d covariance = Matrix6d::Identity() * kSigmaRad * kSigmaRad;
+    covariance.topLeftCorner<3, 3>() *= std::pow(kDepthShare * depth_m / kSigmaRad, 2);
+    const Rigid3 T_fixed_ref = T_fixed_moved * keyframe.T_world_ref;
+    for (const std::size_t partner :
+         partnersOf(keyframe.cloud, T_fixed_ref, fixed, options.loop_min_overlap)) {
+      ++pairs.checked;
+      const LoopCheck check = verifyLoop(
+          {partner, fixed.size(), fixed[partner].T_world_ref.inverse() * T_fixed_ref},
+          fixed[partner].cloud, keyframe.cloud, covariance, options, KeyframeRegistrationOptions());
+      if (!check.factor) continue;
+      const Rigid3 T_middle_ref = T_moved_middle.inverse() * keyframe.T_world_ref;
+      RelativePoseFactor& factor = pairs.graph.factors.emplace_back(*check.factor);
+      factor.T_from_to = factor.T_from_to * T_middle_ref.inverse();
+      factor.sqrt_information = factor.sqrt_information * adjointOf(T_middle_ref);
+    }
+    keyframe.cloud.releaseTree();
+  }
+  return pairs;
+}
+
 }  // namespace
 
 MapRegistration registerMap(const std::vector<PosedCloud>& fixed,
                             const std::vector<PosedCloud>& moved) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const PosedCloud& keyframe : moved) middle += keyframe.T_world_ref.translation;
-  middle /= std::max<double>(1, static_cast<double>(moved.size()));
-  const Rigid3 T_world_middle{Eigen::Quaterniond::Identity(), middle};
-
-  // The last pose is that of the moved map about its middle.
-  PoseGraph graph;
-  for (const PosedCloud& keyframe : fixed) graph.T_world_node.push_back(keyframe.T_world_ref);
-  graph.fixed.assign(fixed.size(), true);
-  graph.T_world_node.push_back(T_world_middle);
-  graph.fixed.push_back(false);
+  Rigid3 T_moved_middle;
+  for (const PosedCloud& keyframe : moved) {
+    T_moved_middle.translation +=
+        keyframe.T_world_ref.translation / static_cast<double>(moved.size());
+  }
   MapRegistration registration;
-  for (std::size_t i = 0; i < moved.size(); ++i) {
-    const PosedCloud& keyframe = moved[i];
-    LoopOptions options;
-    const double depth_m = 1 / std::max(keyframe.cloud.middleInverseDepth(), 1e-9);
-    options.loop_max_sigma_m = std::max(options.loop_max_sigma_m, kDepthShare * depth_m / 3);
-    Matrix6d covariance = Matrix6d::Identity() * kSigmaRad * kSigmaRad;
-    covariance.topLeftCorner<3, 3>() *= std::pow(kDepthShare * depth_m / kSigmaRad, 2);
-    for (const std::size_t partner : partnersOf(keyframe, fixed, options.loop_min_overlap)) {
-      ++registration.checked;
-      const LoopCandidate candidate{partner, fixed.size(),
-                                    fixed[partner].T_world_ref.inverse() * keyframe.T_world_ref};
-      LoopCheck check = verifyLoop(candidate, fixed[partner].cloud, keyframe.cloud, covariance,
-                                   options, KeyframeRegistrationOptions());
-      if (!check.factor) continue;
-      const Rigid3 T_middle_ref = T_world_middle.inverse() * keyframe.T_world_ref;
-      check.factor->T_from_to = check.factor->T_from_to * T_middle_ref.inverse();
-      check.factor->sqrt_information = check.factor->sqrt_information * adjointOf(T_middle_ref);
-      graph.factors.push_back(*check.factor);
+  Pairs pairs;
+  for (int round = 0; round < kRounds; ++round) {  // the first may find few pairs, far from there
+    pairs = pairsOf(fixed, moved, T_moved_middle, registration.T_fixed_moved);
+    if (pairs.graph.factors.size() < kMinMapPairs ||
+        !solvePoseGraph(PoseGraphOptions(), pairs.graph)) {
+      throw std::runtime_error(
+          "it cannot be registered: " + std::to_string(pairs.graph.factors.size()) + " of " +
+          std::to_string(pairs.checked) +
+          " pairs of keyframes fit on each other: expected maps of one place, at most 5 % of its "
+          "depth and 3 degrees apart (--transform)");
     }
-    keyframe.cloud.releaseTree();
+    registration.T_fixed_moved = pairs.graph.T_world_node.back() * T_moved_middle.inverse();
   }
-  if (graph.factors.size() < kMinMapPairs || !solvePoseGraph(PoseGraphOptions(), graph)) {
-    throw std::runtime_error(
-        "the maps cannot be registered: " + std::to_string(graph.factors.size()) + " of " +
-        std::to_string(registration.checked) +
-        " pairs of keyframes fit on each other: expected maps of one place, "
-        "at most 10 % of its depth and 6 degrees apart");
-  }
-  const Rigid3 T_world_moved = graph.T_world_node.back();
-  registration.T_fixed_moved = T_world_moved * T_world_middle.inverse();
+  const Rigid3 T_fixed_middle = pairs.graph.T_world_node.back();
   double squared_errors = 0;
-  for (const RelativePoseFactor& factor : graph.factors) {
-    const double error = errorOf(factor, graph.T_world_node[factor.from], T_world_moved);
-    if (error > kAgreeSigmas * std::sqrt(6.)) continue;
+  for (const RelativePoseFactor& factor : pairs.graph.factors) {
+    const double error = errorOf(factor, pairs.graph.T_world_node[factor.from], T_fixed_middle);
+    if (error > kAgreeSigmas) continue;
     ++registration.pairs;
     squared_errors += error * error;
   }
-  if (2 * registration.pairs < graph.factors.size()) {
-    throw std::runtime_error("the maps cannot be registered: their keyframes do not agree");
+  registration.checked = pairs.checked;
+  const auto covariance =
+      poseCovariance(PoseGraphOptions(), pairs.graph, pairs.graph.T_world_node.size() - 1);
+  if (!covariance || registration.pairs < kMinMapPairs ||
+      2 * registration.pairs < pairs.graph.factors.size()) {
+    throw std::runtime_error("it cannot be registered: " + std::to_string(registration.pairs) +
+                             " of " + std::to_string(pairs.graph.factors.size()) +
+                             " pairs of keyframes agree: expected maps of one place");
   }
-  const auto covariance = poseCovariance(PoseGraphOptions(), graph, fixed.size());
+  registration.moved_m = (T_fixed_middle.translation - T_moved_middle.translation).norm();
+  registration.moved_rad = T_fixed_middle.rotation.angularDistance(T_moved_middle.rotation);
   const double scale =
       std::sqrt(std::max(1., squared_errors / static_cast<double>(6 * registration.pairs)));
-  registration.moved_m = (T_world_moved.translation - middle).norm();
-  registration.moved_rad = T_world_moved.rotation.angularDistance(Eigen::Quaterniond::Identity());
-  if (covariance) {
-    registration.sigma_m =
-        scale * std::sqrt(maxEigenvalue(Eigen::Matrix3d(covariance->topLeftCorner<3, 3>())));
-    registration.sigma_rad =
-        scale * std::sqrt(maxEigenvalue(Eigen::Matrix3d(covariance->bottomRightCorner<3, 3>())));
-  }
+  registration.sigma_m =
+      scale * std::sqrt(maxEigenvalue(Eigen::Matrix3d(covariance->topLeftCorner<3, 3>())));
+  registration.sigma_rad =
+      scale * std::sqrt(maxEigenvalue(Eigen::Matrix3d(covariance->bottomRightCorner<3, 3>())));
   return registration;
 }
 

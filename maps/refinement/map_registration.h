@@ -28,7 +28,7 @@ struct MapRegistration {
 };
 
 /// Finds how a map lies relative to another one that shares places with it, by pairs of keyframes:
-/// each is checked as a loop is (`verifyLoop`). Corrects about 10 % of the scene's depth, and 6
+/// each is checked as a loop is (`verifyLoop`). Corrects about 5 % of the scene's depth, and 3
 /// degrees.
 /// @param fixed, moved the keyframes of both; some of each are enough.
 /// @throws std::runtime_error if no pair sees the same place, or the pairs do not agree.

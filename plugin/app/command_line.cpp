@@ -77,8 +77,8 @@ void addExport(CLI::App& app, Run& run) {
       ->type_name("FILE")
       ->allow_extra_args(false);
   command.add_flag("--register", arguments->registers,
-                   "Sessions: correct the transforms by what the keyframes see: about 10 % of the "
-                   "scene's depth, and 6 degrees");
+                   "Sessions: correct the transforms by what the keyframes see: about 5 % of the "
+                   "scene's depth, and 3 degrees");
   command.add_flag("--store", arguments->store,
                    "Sessions: add the poses of --poses FILE to the session, for later exports");
   constexpr int kCorners = 6;

@@ -168,13 +168,8 @@ int exportSessions(const ExportArguments& arguments) {
   for (const std::filesystem::path& file : arguments.transforms) {
     what.T_first_this.push_back(readHandEye(file));
   }
-  if (const std::vector<double>& m = arguments.box_m; !m.empty()) {
-    what.box = Box{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}};
-    if (!(what.box->min_m.array() <= what.box->max_m.array()).all()) {
-      throw UsageError("--box: expected the lower corner first: X0,Y0,Z0,X1,Y1,Z1");
-    }
-  }
   const SessionMap map = asUsage([&] {
+    if (!arguments.box_m.empty()) what.box = Box::of(arguments.box_m);
     requireMapFile(arguments.out, what);
     return SessionMap(what);
   });

@@ -50,31 +50,48 @@ void writeTo(const fs::path& out, const std::function<void(std::ostream&)>& writ
   });
 }
 
+/// The points of a map, slab by slab: the memory does not grow with the map.
+class SlabMap {
+ public:
+  /// @param beside the points are kept in the folder of this file.
+  SlabMap(const SessionMap& map, const fs::path& beside, const SessionMap::OnKeyframe& on_keyframe)
+      : map_(map), spool_(beside) {
+    constexpr std::size_t kMaxVoxels = 1'500'000;
+    CloudOrigin origin(map.options().cloud.voxel_size_m);
+    map.visitSlabs(kMaxVoxels, on_keyframe, [&](const std::vector<CloudPoint>& slab) {
+      origin.add(slab);
+      spool_.add(slab);
+    });
+    origin_ = origin.origin();
+    MapHasher hash;
+    visit([&](const MapCloud& slab) {
+      made_.points += slab.size();
+      hash.add(slab);
+    });
+    map.requirePoints(made_.points);
+    made_.hash = hash.finish();
+  }
+
+  const Eigen::Vector3f& origin() const { return origin_; }
+  const ExportedMap& made() const { return made_; }
+  void visit(const std::function<void(const MapCloud&)>& take) {
+    spool_.visit([&](const std::vector<CloudPoint>& slab) { take(*map_.cloudOf(origin_, slab)); });
+  }
+
+ private:
+  const SessionMap& map_;
+  PointSpool spool_;
+  Eigen::Vector3f origin_;
+  ExportedMap made_;
+};
+
 ExportedMap writePcdOf(const SessionMap& map, const fs::path& out) {
-  constexpr std::size_t kMaxVoxels = 1'500'000;
-  PointSpool spool(out);
-  CloudOrigin origin(map.options().cloud.voxel_size_m);
-  map.visitSlabs(kMaxVoxels, {}, [&](const std::vector<CloudPoint>& slab) {
-    origin.add(slab);
-    spool.add(slab);
-  });
-  const auto visit = [&](const std::function<void(const MapCloud&)>& take) {
-    spool.visit(
-        [&](const std::vector<CloudPoint>& slab) { take(*map.cloudOf(origin.origin(), slab)); });
-  };
-  ExportedMap made;
-  MapHasher hash;
-  visit([&](const MapCloud& slab) {
-    made.points += slab.size();
-    hash.add(slab);
-  });
-  map.requirePoints(made.points);
-  made.hash = hash.finish();
+  SlabMap slabs(map, out, {});
   writeTo(out, [&](std::ostream& stream) {
-    writePcdHeader(stream, made.points, origin.origin());
-    visit([&](const MapCloud& slab) { writePcdPoints(stream, slab); });
+    writePcdHeader(stream, slabs.made().points, slabs.origin());
+    slabs.visit([&](const MapCloud& slab) { writePcdPoints(stream, slab); });
   });
-  return made;
+  return slabs.made();
 }
 
 /// Returns how the map is made: the run of the first session, with the options of [map] in use.
@@ -90,11 +107,11 @@ Json runIn(const SessionMap& map) {
 }
 
 /// Returns the report of a page or a session.
-Json reportOf(const SessionMap& map, const MapCloud& points) {
+Json reportOf(const SessionMap& map, const ExportedMap& made) {
   Json report = {{"version", EFM_VERSION},
                  {"keyframes", map.trajectory().size()},
-                 {"points", points.size()},
-                 {"map_hash", mapHash(points)}};
+                 {"points", made.points},
+                 {"map_hash", made.hash}};
   const SessionFile& first = *map.sessions().front();
   const Json before = Json::parse(first.report(), nullptr, false);
   const bool is_whole = map.sessions().size() == 1 && first.keyframes() == map.trajectory().size();
@@ -113,7 +130,7 @@ MapSnapshot writePage(const SessionMap& map, const fs::path& out) {
     pictures->add(keyframe.map.depth, keyframe.view_events);
   });
   const Json run = runIn(map);
-  Json report = reportOf(map, *made.points);
+  Json report = reportOf(map, {made.points->size(), mapHash(*made.points)});
   for (const char* key : {"chosen", "options"}) {
     if (run.contains(key)) report[key] = run[key];
   }
@@ -128,14 +145,15 @@ MapSnapshot writePage(const SessionMap& map, const fs::path& out) {
   return made;
 }
 
-MapSnapshot writeSession(const SessionMap& map, const fs::path& out) {
-  MapSnapshot made;
+ExportedMap writeSession(const SessionMap& map, const fs::path& out) {
+  ExportedMap made;
   writeAtomically(out, [&](const fs::path& temporary) {
     SessionWriter session(temporary, runIn(map));
-    made = map.snapshot(
-        false, [&](std::size_t, const KeyframeDepthMap& keyframe) { session.add(keyframe); });
+    made = SlabMap(map, out, [&](std::size_t, const KeyframeDepthMap& keyframe) {
+             session.add(keyframe);
+           }).made();
     session.addPoses(map.trajectory());
-    session.finish(reportOf(map, *made.points).dump(2, ' ', false, Json::error_handler_t::replace));
+    session.finish(reportOf(map, made).dump(2, ' ', false, Json::error_handler_t::replace));
   });
   return made;
 }
@@ -153,7 +171,6 @@ MapSnapshot writeColmap(const SessionMap& map, const fs::path& out) {
 
 MapSnapshot writeInMemory(const SessionMap& map, const fs::path& out, MapFile kind) {
   if (kind == MapFile::kPage) return writePage(map, out);
-  if (kind == MapFile::kSession) return writeSession(map, out);
   if (kind == MapFile::kColmap) return writeColmap(map, out);
   MapSnapshot made = map.snapshot(kind == MapFile::kSimpleMap);
   if (kind == MapFile::kPly) {
@@ -183,6 +200,7 @@ void requireMapFile(const fs::path& out, const SessionExport& what) {
 ExportedMap exportSession(const SessionMap& map, const fs::path& out) {
   const auto kind = kindOf(out);
   if (kind == MapFile::kPcd) return writePcdOf(map, out);
+  if (kind == MapFile::kSession) return writeSession(map, out);
   const MapSnapshot made = writeInMemory(map, out, kind.value());
   return {made.points->size(), mapHash(*made.points)};
 }

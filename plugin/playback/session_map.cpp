@@ -130,7 +130,7 @@ void SessionMap::openSessions() {
       throw std::runtime_error(
           file.string() +
           ": its run did not end, and its poses are not refined yet: expected a "
-          "run that ended (map --resume), or --poses tracker");
+          "run that ended (map --resume), or the tracker's poses (--poses tracker)");
     }
   }
 }
@@ -146,26 +146,26 @@ void SessionMap::readOptions() {
   for (const std::string& assignment : what_.sets) {
     const std::string name(trimmed(std::string_view(assignment).substr(0, assignment.find('='))));
     if (name.rfind("map.", 0) != 0 && name != "depth.min_probability") {
-      throw std::invalid_argument("--set " + assignment +
+      throw std::invalid_argument(assignment +
                                   ": expected an option of [map], or depth.min_probability: the "
                                   "keyframes were made with the others (map RECORDING)");
     }
     reader.set(assignment);
     if (reader.unchecked().automatic.voxel_size_m) {
-      throw std::invalid_argument("--set " + assignment + ": expected a number of metres");
+      throw std::invalid_argument(assignment + ": expected a number of metres");
     }
   }
   options_ = reader.options();
   if (minProbability(options_) < least) {
     throw std::invalid_argument(
-        fmt::format("--set depth.min_probability={}: expected at least {}, with which the "
+        fmt::format("depth.min_probability={}: expected at least {}, with which the "
                     "keyframes were made",
                     minProbability(options_), least));
   }
   what_.limits.validate();
   if (sessions_.size() > 1 && !what_.poses.empty()) {
     throw std::invalid_argument(
-        "--poses FILE: is for one session: correct each by itself (--store)");
+        "poses of a file are for one session: correct each by itself, and store it");
   }
 }
 
@@ -318,6 +318,17 @@ void SessionMap::requirePoints(std::size_t points) const {
   if (points > 0) return;
   throw std::runtime_error(
       fmt::format("there is no point: {} keyframes are chosen", chosen_.size()));
+}
+
+Box Box::of(const std::vector<double>& m) {
+  constexpr std::size_t kCorners = 6;
+  Box box;
+  if (m.size() == kCorners) box = {{m[0], m[1], m[2]}, {m[3], m[4], m[5]}};
+  if (m.size() != kCorners || !(box.min_m.array() <= box.max_m.array()).all()) {
+    throw std::invalid_argument(
+        "box: expected two corners, the lower one first: x0,y0,z0,x1,y1,z1");
+  }
+  return box;
 }
 
 bool Box::contains(const Eigen::Vector3d& p_world) const {

@@ -29,6 +29,8 @@ namespace efm {
 struct Box {
   Eigen::Vector3d min_m, max_m;
 
+  /// @param corners x0 y0 z0 x1 y1 z1. @throws std::invalid_argument unless they are a box.
+  static Box of(const std::vector<double>& corners);
   bool contains(const Eigen::Vector3d& p_world) const;
 };
 
@@ -64,6 +66,7 @@ class SessionMap {
   /// cannot be used.
   explicit SessionMap(SessionExport what);
 
+  const SessionExport& what() const { return what_; }
   const EventFusionOptions& options() const { return options_; }
   const std::vector<std::unique_ptr<const SessionFile>>& sessions() const { return sessions_; }
   /// T_world_ref of the chosen keyframes, one session after the other.

@@ -141,6 +141,25 @@ class SessionFile:
     @property
     def damage(self) -> str: ...
 
+class SessionMap:
+    def __init__(
+        self,
+        sessions: Sequence[str],
+        sets: Sequence[str],
+        t0_ns: Optional[int],
+        t1_ns: Optional[int],
+        box: Sequence[float],
+        refined: bool,
+        poses: str,
+        T_first_this: Sequence[npt.ArrayLike],
+        registers: bool,
+    ) -> None: ...
+    def points(self) -> _Array: ...
+    def export(self, out: str) -> None: ...
+    def store_poses(self) -> None: ...
+    @property
+    def registrations(self) -> list[dict[str, Any]]: ...
+
 def run_map(
     source: Source,
     options: Options,

@@ -215,14 +215,22 @@ def engine_options(options: Options | None) -> _engine.Options:
     elif options is not None and not isinstance(options, Mapping):
         raise TypeError(f"options = {options!r}: expected {{'section.key': value, …}}, or the path of an .ini file")
     else:
-        for key, value in (options or {}).items():
-            if isinstance(value, (bool, np.bool_)):
-                value = str(value).lower()
-            elif isinstance(value, (list, tuple, np.ndarray)):
-                value = ",".join(str(part) for part in value)
-            made.set(key, str(value))
+        for key, text in option_texts(options or {}).items():
+            made.set(key, text)
     made.validate()
     return made
+
+
+def option_texts(options: Mapping[str, Any]) -> dict[str, str]:
+    """Return options with their values as in the .ini files."""
+    texts = {}
+    for key, value in options.items():
+        if isinstance(value, (bool, np.bool_)):
+            value = str(value).lower()
+        elif isinstance(value, (list, tuple, np.ndarray)):
+            value = ",".join(str(part) for part in value)
+        texts[key] = str(value)
+    return texts
 
 
 class _Percentage:

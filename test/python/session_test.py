@@ -4,10 +4,12 @@
 import hashlib
 import json
 import os
+import shutil
 import struct
 import subprocess
 import zlib
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import zstandard
@@ -271,12 +273,113 @@ def test_sessions_are_corrected_cut_and_merged(tmp_path):
     assert (tmp_path / "stored.pcd").read_bytes() == (tmp_path / "fixed.pcd").read_bytes()
     # Cut between two keyframes, and put together again.
     middle = (times[len(times) // 2 - 1] + times[len(times) // 2]) / 2
-    program("export", whole, "--out", tmp_path / "early.pcd", "--t1", middle)
-    assert (tmp_path / "early.pcd").read_bytes() != (whole / "map.pcd").read_bytes()
-    # Two sessions, of which the second is where --transform says.
-    (tmp_path / "T.yaml").write_text("T_body_rig: [[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n")
-    text = program("export", whole, noisy, "--out", tmp_path / "two.pcd", "--transform", tmp_path / "T.yaml")
-    assert f"{2 * len(times)} keyframes" in text
-    box = program("export", whole, noisy, "--out", tmp_path / "second.pcd", "--transform", tmp_path / "T.yaml",
-                  "--box", "2.5,-9,-9,99,9,9", "--poses", "tracker")
-    assert " 0 points" not in box
+    program("export", whole, "--out", tmp_path / "early.mcap", "--t1", middle)
+    program("export", whole, "--out", tmp_path / "late.mcap", "--t0", middle)
+    program("export", tmp_path / "early.mcap", tmp_path / "late.mcap", "--out", tmp_path / "again.pcd")
+    assert (tmp_path / "again.pcd").read_bytes() == (whole / "map.pcd").read_bytes()
+    # The points in a box are those of the map.
+    program("export", whole, "--out", tmp_path / "box.pcd", "--box", "-0.2,-9,-9,0.3,9,9")
+    rows = pcd(whole / "map.pcd")
+    inside = rows[(rows["x"] >= -0.2) & (rows["x"] <= 0.3)]
+    assert 0 < len(inside) < len(rows) and pcd(tmp_path / "box.pcd").tobytes() == inside.tobytes()
+    # A simplemap whose poses another program moved: those of the noisy session, and then the exact ones.
+    program("export", noisy, "--out", tmp_path / "by_simplemap.pcd", "--poses", whole / "map.simplemap")
+    rows, exact_rows = pcd(tmp_path / "by_simplemap.pcd"), pcd(tmp_path / "fixed.pcd")
+    assert abs(len(rows) - len(exact_rows)) < 0.001 * len(rows)
+    assert np.allclose(np.median(rows["x"]), np.median(exact_rows["x"]), atol=1e-3)
+
+
+def pcd(path):
+    data = path.read_bytes()
+    names = ["x", "y", "z", "intensity", "support", "sigma", "probability"]
+    return np.frombuffer(data[data.index(b"DATA binary\n") + 12 :], [(n, "<u4" if n == "support" else "<f4") for n in names])
+
+
+def test_the_module_makes_corrects_and_merges_maps(result, tmp_path):
+    made, out = result
+    shutil.copy(out / "session.mcap", tmp_path / "a.mcap")
+    session = ef.Session(tmp_path / "a.mcap")
+    assert session.cloud().tobytes() == made.points.tobytes()
+    few = session.cloud(voxel_size_m=0.05, min_keyframes=2, min_probability=0.96, box=[-9, -9, -9, 0.1, 9, 9])
+    assert 0 < len(few) < len(made.points) and few["support"].min() >= 2 and few["x"].max() <= 0.1
+    program("export", tmp_path / "a.mcap", "--out", tmp_path / "few.pcd", "--set", "map.voxel_size_m=0.05", "--set", "map.min_keyframes=2",
+            "--set", "depth.min_probability=0.96", "--box", "-9,-9,-9,0.1,9,9")
+    assert np.array_equal(pcd(tmp_path / "few.pcd")["x"], few["x"].astype("f4"))
+    with pytest.raises(ValueError, match="min_probability=0.1: expected at least"):
+        session.cloud(min_probability=0.1)
+    with pytest.raises(ValueError, match="dsi.max_depth_m=3: expected an option of"):
+        session.cloud(options={"dsi.max_depth_m": 3})
+    # Corrected by poses that are all displaced, the map is displaced.
+    times, poses = session.poses()
+    moved = poses.copy()
+    moved[:, 0, 3] += 1
+    session.correct((times, moved))
+    assert np.allclose(session.poses()[1], moved) and np.array_equal(ef.Session(tmp_path / "a.mcap").poses()[1], session.poses()[1])
+    assert np.isclose(np.median(session.cloud()["x"]), np.median(made.points["x"]) + 1, atol=1e-3)
+    # Half of it, displaced by 5 cm and 2 degrees, is registered with the other half.
+    whole = ef.Session(out)
+    half = int(times[len(times) // 2])
+    whole.export(tmp_path / "early.mcap", t1=half)
+    whole.export(tmp_path / "late.mcap", t0=half)
+    early, late = ef.Session(tmp_path / "early.mcap"), ef.Session(tmp_path / "late.mcap")
+    assert len(early) + len(late) == len(whole)
+    angle = np.deg2rad(2)
+    wrong = np.eye(4)
+    wrong[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    wrong[:3, 3] = 0.03, 0.04, 0
+    merged = early.merge([late], tmp_path / "merged.mcap", transforms=[wrong], register=True)
+    (found,) = merged.registrations
+    assert found["pairs"] >= 2 and found["sigma_m"] < 0.02 and found["moved_deg"] == pytest.approx(2, abs=0.3)
+    true = poses[len(early) :, :3, 3]
+    error = np.linalg.norm(merged.poses()[1][len(early) :, :3, 3] - true, axis=1)
+    before = np.linalg.norm(true @ wrong[:3, :3].T + wrong[:3, 3] - true, axis=1)
+    assert error.max() < 4 * found["sigma_m"] and error.max() < 0.3 * before.max()  # 4: of a normal distribution, practically all
+    assert np.allclose(merged.poses()[1][: len(early)], poses[: len(early)])
+
+
+def colmap_lines(path):
+    return [line.split() for line in path.read_text().split("\n") if not line.startswith("#")]
+
+
+def test_a_colmap_model_shows_points_on_edges(result, tmp_path):
+    """Read by the rules of COLMAP's text format: https://colmap.github.io/format.html."""
+    out = tmp_path / "desk_colmap"
+    program("export", result[1], "--out", out)
+    cameras = {row[0]: (row[1], *map(float, row[2:])) for row in colmap_lines(out / "sparse/0/cameras.txt") if row}
+    points = {row[0]: row[1:] for row in colmap_lines(out / "sparse/0/points3D.txt") if row}
+    rows = colmap_lines(out / "sparse/0/images.txt")[:-1]
+    transforms = json.loads((out / "transforms.json").read_text())
+    assert len(rows) == 2 * len(result[0].keyframes) == 2 * len(transforms["frames"]) and len(points) == len(result[0].points)
+    tracks = {(row[7 + k], row[8 + k]): key for key, row in points.items() for k in range(0, len(row) - 7, 2)}
+    near, all_points = 0, 0
+    for frame, image, observed in zip(transforms["frames"], rows[::2], rows[1::2]):
+        number, (w, x, y, z), t, (model, width, height, fx, fy, cx, cy) = image[0], map(float, image[1:5]), np.array(image[5:8], float), cameras[image[8]]
+        assert model == "PINHOLE" and frame["file_path"] == "images/" + image[9] and frame["fl_x"] == fx
+        R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+        pose = np.array(frame["transform_matrix"]) @ np.diag([1, -1, -1, 1])  # T_world_camera
+        assert np.allclose(np.linalg.inv(pose)[:3], np.c_[R, t])
+        picture = plt.imread(out / "images" / image[9])
+        assert picture.shape[:2] == (height, width)
+        on_edge = np.pad((picture[..., :3] < 1).any(axis=2), 1)
+        on_edge = np.any([on_edge[1 + dy : on_edge.shape[0] - 1 + dy, 1 + dx : on_edge.shape[1] - 1 + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)
+        for k in range(0, len(observed), 3):
+            key = observed[k + 2]
+            assert tracks[number, str(k // 3)] == key
+            p = R @ np.array(points[key][:3], float) + t
+            u, v = fx * p[0] / p[2] + cx, fy * p[1] / p[2] + cy
+            assert np.hypot(u - float(observed[k]), v - float(observed[k + 1])) < 4  # a voxel of 1 cm at 0.6 m
+            near += on_edge[min(int(v), int(height) - 1), min(int(u), int(width) - 1)]
+            all_points += 1
+    assert all_points > len(points) and near > 0.8 * all_points  # of all pixels, a quarter is as near
+
+
+def test_a_session_has_a_page(result, tmp_path):
+    shutil.copy(result[1] / "session.mcap", tmp_path / "live.mcap")
+    for words in (("view", tmp_path / "live.mcap"), ("export", result[1], "--out", tmp_path / "page.html")):
+        program(*words)
+    for page in ("live.html", "page.html"):
+        text = (tmp_path / page).read_text()
+        report = json.loads(text.split('id="report-data" type="application/json">')[1].split("</script>")[0])
+        assert report["keyframes"] == len(result[0].keyframes) and report["map_hash"] == result[0].hash

@@ -379,6 +379,41 @@ TEST(MapConsistency, FinalizedKeyframesMakeTheSameMapBitForBit) {
   }
 }
 
+TEST(MapConsistency, SlabsMakeTheSameMapBitForBit) {
+  constexpr std::size_t kMaxVoxels = 300;
+  std::mt19937 random(7);
+  const std::vector<View> views = viewsWithOutliers(random, 40);
+  for (const Consistency consistency :
+       {Consistency::kNone, Consistency::kSupport, Consistency::kVisibility}) {
+    GlobalCloud whole(withConsistency(consistency));
+    for (std::uint64_t k = 0; k < views.size(); ++k) {
+      whole.insert(k, views[k].points, views[k].T_world_ref);
+    }
+    std::vector<CloudPoint> points;
+    int slabs = 0;
+    constexpr std::int64_t kEnd = std::numeric_limits<std::int64_t>::max();
+    for (std::int64_t begin = -kEnd, end = begin; end != kEnd; ++slabs) {
+      begin = end;
+      end = kEnd;
+      GlobalCloud slab(withConsistency(consistency));
+      slab.keepSlab(begin, end);
+      for (std::uint64_t k = 0; k < views.size(); ++k) {
+        slab.insert(k, views[k].points, views[k].T_world_ref);
+        if (k > GlobalCloud::kMaxNumberDifference && random() % 3 == 0) {
+          slab.finalize(k - GlobalCloud::kMaxNumberDifference);
+        }
+        if (slab.finalizedVoxels() <= kMaxVoxels) continue;
+        if (const auto middle = slab.middleX()) slab.keepSlab(begin, end = *middle);
+      }
+      const std::vector<CloudPoint> more = slab.pointsInWorld(1);
+      points.insert(points.end(), more.begin(), more.end());
+    }
+    EXPECT_GT(slabs, 4);
+    const double voxel_m = whole.options().voxel_size_m;
+    EXPECT_TRUE(test::sameBits(*mapCloudOf(points, voxel_m), *whole.points(1)));
+  }
+}
+
 }  // namespace
 
 }  // namespace efm

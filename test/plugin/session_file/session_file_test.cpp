@@ -376,6 +376,17 @@ TEST_F(SessionFileTest, TheHashDependsOnThePointsAlone) {
   cloud.front().sigma = 0.5F;
   EXPECT_NE(mapHash(cloud), hash);
   // The SHA-256 of nothing.
+  MapHasher in_parts;
+  std::sort(cloud.begin(), cloud.end(),
+            [](const MapPoint& a, const MapPoint& b) { return a.x < b.x; });
+  for (std::size_t begin = 0; begin < cloud.size(); begin += 2) {
+    MapCloud part;
+    part.sensor_origin_ = cloud.sensor_origin_;
+    for (std::size_t i = begin; i < std::min(begin + 2, cloud.size()); ++i)
+      part.push_back(cloud[i]);
+    in_parts.add(part);
+  }
+  EXPECT_EQ(in_parts.finish(), mapHash(cloud));
   EXPECT_EQ(mapHash({}), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
 }
 
