@@ -15,8 +15,8 @@ namespace efm {
 namespace {
 
 constexpr int kRounds = 3;
-constexpr std::size_t kPartners = 3;  // of each keyframe
-constexpr std::size_t kMinMapPairs = 2;
+constexpr std::size_t kPartners = 3;     // of each keyframe
+constexpr std::size_t kMinMapPairs = 2;  // of more than one
 /// The expected displacement: a share of the scene's depth, and an angle.
 constexpr double kDepthShare = 0.03;
 constexpr double kSigmaRad = 2 * kRadiansPerDegree;
@@ -105,7 +105,8 @@ MapRegistration registerMap(const std::vector<PosedCloud>& fixed,
   Pairs pairs;
   for (int round = 0; round < kRounds; ++round) {  // the first may find few pairs, far from there
     pairs = pairsOf(fixed, moved, T_moved_middle, registration.T_fixed_moved);
-    if (pairs.graph.factors.size() < kMinMapPairs ||
+    if (pairs.graph.factors.size() <
+            std::max<std::size_t>(1, std::min(kMinMapPairs, pairs.checked)) ||
         !solvePoseGraph(PoseGraphOptions(), pairs.graph)) {
       throw std::runtime_error(
           "it cannot be registered: " + std::to_string(pairs.graph.factors.size()) + " of " +
@@ -126,8 +127,7 @@ MapRegistration registerMap(const std::vector<PosedCloud>& fixed,
   registration.checked = pairs.checked;
   const auto covariance =
       poseCovariance(PoseGraphOptions(), pairs.graph, pairs.graph.T_world_node.size() - 1);
-  if (!covariance || registration.pairs < kMinMapPairs ||
-      2 * registration.pairs < pairs.graph.factors.size()) {
+  if (!covariance || 2 * registration.pairs < pairs.graph.factors.size()) {
     throw std::runtime_error("it cannot be registered: " + std::to_string(registration.pairs) +
                              " of " + std::to_string(pairs.graph.factors.size()) +
                              " pairs of keyframes agree: expected maps of one place");

@@ -267,6 +267,7 @@ std::set<std::size_t> SessionMap::visitSlabs(
   constexpr std::int64_t kEnd = std::numeric_limits<std::int64_t>::max();
   std::set<std::size_t> left_out;
   std::vector<Range> ranges(chosen_.size());
+  Range all;
   std::int64_t begin = std::numeric_limits<std::int64_t>::min(), end = begin;
   /// Returns whether a keyframe has points in the slab, or checks those of one that has.
   const auto reaches = [&](std::size_t i) {
@@ -277,8 +278,14 @@ std::set<std::size_t> SessionMap::visitSlabs(
     }
     return false;
   };
+  double voxels_per_x = 0;  // of the last slab
   for (bool is_first = true; end != kEnd; is_first = false) {
     begin = std::exchange(end, kEnd);
+    // A guess, so that few keyframes are read that the slab does not have at its end.
+    const double width = 1.2 * static_cast<double>(max_voxels) / voxels_per_x;
+    if (!is_first && width < static_cast<double>(all.last - begin)) {
+      end = begin + 1 + static_cast<std::int64_t>(width);
+    }
     RefinedCloud cloud(options_.cloud, 0);
     cloud.keepSlab(begin, end);
     QualityStatistics quality;
@@ -296,6 +303,8 @@ std::set<std::size_t> SessionMap::visitSlabs(
         if (on_keyframe) on_keyframe(i, made);
         points = pointsOf(made);
         ranges[i] = Range(points, T_world_ref, options_.cloud.voxel_size_m);
+        all.first = std::min(all.first, ranges[i].first);
+        all.last = std::max(all.last, ranges[i].last);
         if (options_.checks) {
           if (i > 0) leaveOutBad(i - 1);
           made.T_world_ref = made.T_odom_ref;  // a run judges it before the refinement
@@ -309,6 +318,8 @@ std::set<std::size_t> SessionMap::visitSlabs(
       if (const auto middle = cloud.cloud().middleX()) cloud.keepSlab(begin, end = *middle);
     }
     if (is_first) leaveOutBad(quality.keyframes());
+    voxels_per_x = static_cast<double>(std::max(cloud.cloud().finalizedVoxels(), max_voxels / 10)) /
+                   (static_cast<double>(end) - static_cast<double>(std::max(begin, all.first)));
     on_slab(cloud.cloud().pointsInWorld(options_.cloud.min_keyframes));
   }
   return left_out;
