@@ -183,6 +183,7 @@ std::unique_ptr<SessionMap> sessionMapOf(std::vector<Path> sessions, std::vector
   what.refined = refined;
   what.poses = poses;
   what.registers = registers;
+  what.on_progress = [](double) { checkSignals(); };
   for (const Array& T : T_first_this) what.T_first_this.emplace_back(rigidOf(T, "transforms"));
   if (!box.empty()) what.box = Box::of(box);
   const Released released;

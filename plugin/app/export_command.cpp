@@ -168,6 +168,12 @@ int exportSessions(const ExportArguments& arguments) {
   for (const std::filesystem::path& file : arguments.transforms) {
     what.T_first_this.push_back(readHandEye(file));
   }
+  const Interruption interruption;
+  std::optional<Progress> progress(std::in_place, "exporting", arguments.verbosity);
+  what.on_progress = [&](double fraction) {
+    interruption.check();
+    progress->show(fraction);
+  };
   const SessionMap map = asUsage([&] {
     if (!arguments.box_m.empty()) what.box = Box::of(arguments.box_m);
     requireMapFile(arguments.out, what);
@@ -175,6 +181,7 @@ int exportSessions(const ExportArguments& arguments) {
   });
   const ExportedMap made = exportSession(map, arguments.out);
   if (arguments.store) map.storePoses();
+  progress.reset();
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   for (std::size_t i = 0; i < map.registrations().size(); ++i) {
     const MapRegistration& found = map.registrations()[i];

@@ -15,13 +15,13 @@
 namespace efm {
 namespace {
 
-/// Makes the page of a session, beside it: session.html.
+/// Makes the page of a session, beside it: session.mcap.html.
 std::filesystem::path pageOf(const std::filesystem::path& session) {
   SessionExport what;
   what.sessions = {session};
   const SessionFile file(session);
   what.refined = file.generations() > 0;
-  const std::filesystem::path page = std::filesystem::path(session).replace_extension(".html");
+  const std::filesystem::path page = session.string() + ".html";
   exportSession(SessionMap(what), page);
   return std::filesystem::absolute(page).lexically_normal();
 }

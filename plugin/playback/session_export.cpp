@@ -198,6 +198,12 @@ void requireMapFile(const fs::path& out, const SessionExport& what) {
 }
 
 ExportedMap exportSession(const SessionMap& map, const fs::path& out) {
+  for (const auto& session : map.sessions()) {
+    std::error_code error;
+    if (fs::equivalent(session->path(), out, error)) {
+      throw std::runtime_error(out.string() + ": the session itself: expected another name");
+    }
+  }
   const auto kind = kindOf(out);
   if (kind == MapFile::kPcd) return writePcdOf(map, out);
   if (kind == MapFile::kSession) return writeSession(map, out);

@@ -257,6 +257,9 @@ struct Range {
       last = std::max(last, index);
     }
   }
+  double shareBelow(std::int64_t x) const {
+    return static_cast<double>(x - first) / static_cast<double>(last - first + 1);
+  }
 };
 
 }  // namespace
@@ -282,9 +285,11 @@ std::set<std::size_t> SessionMap::visitSlabs(
   for (bool is_first = true; end != kEnd; is_first = false) {
     begin = std::exchange(end, kEnd);
     // A guess, so that few keyframes are read that the slab does not have at its end.
-    const double width = 1.2 * static_cast<double>(max_voxels) / voxels_per_x;
-    if (!is_first && width < static_cast<double>(all.last - begin)) {
-      end = begin + 1 + static_cast<std::int64_t>(width);
+    if (!is_first) {
+      const double width = 1.2 * static_cast<double>(max_voxels) / voxels_per_x;
+      if (width < static_cast<double>(all.last - begin)) {
+        end = begin + 1 + static_cast<std::int64_t>(width);
+      }
     }
     RefinedCloud cloud(options_.cloud, 0);
     cloud.keepSlab(begin, end);
@@ -295,7 +300,10 @@ std::set<std::size_t> SessionMap::visitSlabs(
         left_out.insert(bad);
       }
     };
+    const double slabs_done = is_first ? 0 : all.shareBelow(begin);
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      const double read = static_cast<double>(i) / static_cast<double>(chosen_.size());
+      what_.on_progress(is_first ? 0.5 * read : 0.5 + 0.5 * slabs_done);
       const Rigid3& T_world_ref = T_world_ref_[i].T_world_rig;
       std::vector<ViewPoint> points;
       if (is_first) {

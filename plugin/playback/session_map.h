@@ -55,6 +55,8 @@ struct SessionExport {
   /// Of the second session and further ones; none: identity.
   std::vector<std::optional<Rigid3>> T_first_this;
   bool registers = false;  ///< Correct T_first_this by the keyframes: `registerMap`.
+  /// Called before each keyframe is read, with the part of the work that is done. May throw.
+  std::function<void(double fraction)> on_progress = [](double) {};
 };
 
 /// The map of sessions, made again: that of a new run with these options, bit for bit

@@ -106,6 +106,10 @@ TEST_F(MapPageInABrowser, OfTheDeskDrawsAndAnswers) {
       testing::AllOf(HasSubstr(out),
                      HasSubstr(std::to_string(report["keyframes"].get<int>()) + " keyframes"),
                      HasSubstr(report["chosen"][0]["reason"].get<std::string>())));
+  ASSERT_EQ(run("export \"" + out + "\" --out session.html").status, 0);
+  const json again = measure("session.html");
+  expectSound(again);
+  EXPECT_EQ(again["points"], light["points"]);
   const json dark = measure(out + "/map.html", "--force-dark-mode");
   expectSound(dark);
   EXPECT_NE(dark["dark"], light["dark"]);

@@ -379,7 +379,7 @@ def test_a_session_has_a_page(result, tmp_path):
     shutil.copy(result[1] / "session.mcap", tmp_path / "live.mcap")
     for words in (("view", tmp_path / "live.mcap"), ("export", result[1], "--out", tmp_path / "page.html")):
         program(*words)
-    for page in ("live.html", "page.html"):
+    for page in ("live.mcap.html", "page.html"):
         text = (tmp_path / page).read_text()
         report = json.loads(text.split('id="report-data" type="application/json">')[1].split("</script>")[0])
         assert report["keyframes"] == len(result[0].keyframes) and report["map_hash"] == result[0].hash

@@ -32,12 +32,12 @@ function showNumbers() {
   }
   for (const reason of quality.reasons) addRow("report", "why", reason);
 
-  const events = report.events, seconds = value => `${number(value)} s`;
+  const events = report.events || {}, seconds = value => `${number(value)} s`;  // none in a session's page
   const part = value => `${(100 * value / events.read).toFixed(1)} %`;
   const left = [["without_pose", "without a pose"], ["outside_window", "outside the keyframes' windows"],
                 ["dropped", "dropped"], ["filtered", "filtered"], ["outside_lens", "outside the lens"],
                 ["over_budget", "over the budget"]];
-  addRow("report", "events", count(events.read));
+  if (events.read !== undefined) addRow("report", "events", count(events.read));
   if (events.read > 0) addRow("report", "used", `${count(events.used)} (${part(events.used)})`);
   for (const [key, words] of left) {
     if (events[key] > 0) addRow("report", "not used", `${part(events[key])} ${words}`);
@@ -47,9 +47,11 @@ function showNumbers() {
       `${most.min[k].toFixed(2)} to ${most.max[k].toFixed(2)} m`));
   }
   addRow("report", "voxel", `${number(map.voxel_m)} m`);
-  addRow("report", "recording", seconds(report.recording_seconds));
-  addRow("report", "time", `${seconds(report.seconds.total)}, ${report.threads} threads, ${report.kernel}`);
-  addRow("report", "memory", `${number(report.peak_memory_bytes / 1e6)} MB`);
+  if (report.seconds) {
+    addRow("report", "recording", seconds(report.recording_seconds));
+    addRow("report", "time", `${seconds(report.seconds.total)}, ${report.threads} threads, ${report.kernel}`);
+    addRow("report", "memory", `${number(report.peak_memory_bytes / 1e6)} MB`);
+  }
   if (report.stopped_at !== undefined) {
     addRow("report", "stopped at", `${(100 * report.stopped_at).toFixed(0)} % of the recording`);
   }
@@ -65,7 +67,7 @@ function showNumbers() {
   }
   addRow("report", "version", report.version);
 
-  for (const [kind, texts] of [["warning", report.warnings], ["note", report.notes || []]]) {
+  for (const [kind, texts] of [["warning", report.warnings || []], ["note", report.notes || []]]) {
     element(`${kind}-section`).hidden = texts.length === 0;
     for (const {name, text} of texts) {
       for (const [tag, words] of [["dt", name], ["dd", text]]) {
