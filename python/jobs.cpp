@@ -169,13 +169,13 @@ py::object storedPoses(const SessionFile& file, bool refined) {
   return posesOf(poses);
 }
 
-/// @param box x0 y0 z0 x1 y1 z1, or empty. @param T_first_this of further sessions: matrices.
+/// @param box x0 y0 z0 x1 y1 z1. @param T_first_this of further sessions: matrices.
 std::unique_ptr<SessionMap> sessionMapOf(std::vector<Path> sessions, std::vector<std::string> sets,
                                          std::optional<std::int64_t> t0_ns,
                                          std::optional<std::int64_t> t1_ns,
-                                         const std::vector<double>& box, bool refined,
-                                         const Path& poses, const std::vector<Array>& T_first_this,
-                                         bool registers) {
+                                         const std::optional<std::vector<double>>& box,
+                                         bool refined, const Path& poses,
+                                         const std::vector<Array>& T_first_this, bool registers) {
   SessionExport what;
   what.sessions = std::move(sessions);
   what.sets = std::move(sets);
@@ -185,7 +185,7 @@ std::unique_ptr<SessionMap> sessionMapOf(std::vector<Path> sessions, std::vector
   what.registers = registers;
   what.on_progress = [](double) { checkSignals(); };
   for (const Array& T : T_first_this) what.T_first_this.emplace_back(rigidOf(T, "transforms"));
-  if (!box.empty()) what.box = Box::of(box);
+  if (box) what.box = Box::of(*box);
   const Released released;
   return std::make_unique<SessionMap>(std::move(what));
 }

@@ -106,6 +106,16 @@ void fillFile(const std::filesystem::path& path, const std::filesystem::path& na
   }
 }
 
+std::function<void(const std::filesystem::path& path)> byStream(
+    std::function<void(std::ostream&)> write) {
+  return [write = std::move(write)](const std::filesystem::path& path) {
+    std::ofstream file(path, std::ios::binary);
+    write(file);
+    file.close();
+    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
+  };
+}
+
 void AtomicFile::replace() {
   syncToDisk(temporary_);
   std::filesystem::rename(temporary_, path_);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <ostream>
 #include <string>
 
 namespace efm {
@@ -12,6 +13,10 @@ namespace efm {
 /// @throws std::runtime_error with the message of `write`, or that the disk is full.
 void fillFile(const std::filesystem::path& path, const std::filesystem::path& named,
               const std::function<void(const std::filesystem::path& path)>& write);
+
+/// Returns a function for `fillFile` and `writeAtomically`; `write` puts the content into a stream.
+std::function<void(const std::filesystem::path& path)> byStream(
+    std::function<void(std::ostream&)> write);
 
 /// A file that appears under its name when it is complete and on the disk. Until then it has a
 /// temporary name in the same folder. A reader sees the complete file, the previous file or none,

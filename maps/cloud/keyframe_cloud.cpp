@@ -112,8 +112,9 @@ void RefinedCloud::finalize() {
   constexpr std::size_t kMinVoxels = 200'000;  // about 15 MB
   constexpr std::uint64_t kCheckers = GlobalCloud::kMaxNumberDifference;
   const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
-  if (newest < movable_ || newest - movable_ < kCheckers) return;
-  const std::uint64_t below = newest - movable_ - kCheckers;
+  // The points of the keyframe before the newest one may be removed.
+  if (newest < movable_ || newest - movable_ < kCheckers + 1) return;
+  const std::uint64_t below = newest - movable_ - kCheckers - 1;
   if (below < next_look_) return;
   if (cloud_.unfinalizedVoxels(below) < std::max(kMinVoxels, cloud_.finalizedVoxels() / 2)) {
     // The cost of a look grows with the keyframes.

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -18,12 +17,7 @@
 namespace efm {
 
 void writePcd(const std::filesystem::path& path, const MapCloud& cloud) {
-  writeAtomically(path, [&](const std::filesystem::path& temporary) {
-    std::ofstream file(temporary, std::ios::binary);
-    writePcdTo(file, cloud);
-    file.close();
-    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
+  writeAtomically(path, byStream([&](std::ostream& stream) { writePcdTo(stream, cloud); }));
 }
 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/point_spool.h"
 
+#include <cerrno>
 #include <stdexcept>
-#include <system_error>
+#include <string>
+
+#include "mapping/base/atomic_file.h"
 
 namespace efm {
 namespace {
@@ -11,21 +14,20 @@ constexpr auto kPointBytes = static_cast<std::streamsize>(sizeof(CloudPoint));
 
 }  // namespace
 
-PointSpool::PointSpool(const std::filesystem::path& beside)
-    : name_(beside),
-      file_(name_.temporary(), std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary) {
-  std::error_code ignored;
-  std::filesystem::remove(name_.temporary(), ignored);
+PointSpool::PointSpool(const std::filesystem::path& beside) : beside_(beside) {
+  const AtomicFile name(beside);  // removes the name at once
+  file_.open(name.temporary(), std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary);
+  if (!file_) throw std::runtime_error("cannot write beside " + beside.string());
 }
 
 void PointSpool::add(const std::vector<CloudPoint>& part) {
   sizes_.push_back(part.size());
   file_.write(reinterpret_cast<const char*>(part.data()),
               static_cast<std::streamsize>(part.size()) * kPointBytes);
-  if (!file_.flush()) {
-    throw std::runtime_error("cannot write the points of " + name_.path().string() +
-                             ": the disk is full");
-  }
+  if (file_.flush()) return;
+  const std::string why = reasonNotWritten(errno);
+  throw std::runtime_error("cannot write the points of " + beside_.string() +
+                           " (56 bytes each): " + (why.empty() ? "the disk fails" : why));
 }
 
 void PointSpool::visit(const std::function<void(const std::vector<CloudPoint>& part)>& take) {
@@ -35,7 +37,7 @@ void PointSpool::visit(const std::function<void(const std::vector<CloudPoint>& p
     part.resize(size);
     file_.read(reinterpret_cast<char*>(part.data()),
                static_cast<std::streamsize>(size) * kPointBytes);
-    if (!file_) throw std::runtime_error("cannot read the points of " + name_.path().string());
+    if (!file_) throw std::runtime_error("cannot read the points of " + beside_.string());
     take(part);
   }
 }

@@ -7,7 +7,6 @@
 #include <functional>
 #include <vector>
 
-#include "mapping/base/atomic_file.h"
 #include "maps/cloud/cloud_points.h"
 
 namespace efm {
@@ -26,7 +25,7 @@ class PointSpool {
   void visit(const std::function<void(const std::vector<CloudPoint>& part)>& take);
 
  private:
-  AtomicFile name_;
+  std::filesystem::path beside_;
   std::fstream file_;
   std::vector<std::size_t> sizes_;  // of the parts
 };

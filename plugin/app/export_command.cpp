@@ -25,6 +25,7 @@
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/session/session_status.h"
+#include "plugin/session_file/keyframe_record.h"
 
 namespace efm {
 int runImport(const ImportArguments& arguments) {
@@ -186,12 +187,19 @@ int exportSessions(const ExportArguments& arguments) {
   for (std::size_t i = 0; i < map.registrations().size(); ++i) {
     const MapRegistration& found = map.registrations()[i];
     fmt::print(
-        "{}: registered, moved {:.2g} cm (sigma {:.1g} cm) and {:.2g} degrees (sigma {:.1g}); {} "
-        "of "
-        "{} pairs of keyframes agree\n",
+        "{}: registered, moved {:.2f} cm (sigma {:.2f}) and {:.3f} degrees (sigma {:.3f}); {} of "
+        "{} "
+        "pairs of keyframes agree\n",
         map.sessions()[i + 1]->path().string(), 100 * found.moved_m, 100 * found.sigma_m,
         found.moved_rad / kRadiansPerDegree, found.sigma_rad / kRadiansPerDegree, found.pairs,
         found.checked);
+    const std::vector<double> pose = numbersIn(*map.what().T_first_this[i]);
+    fmt::print("  T_first_this: {:.6f} (x y z qx qy qz qw)\n", fmt::join(pose, " "));
+  }
+  if (!what.poses.empty()) {
+    fmt::print("{}: {}\n", what.poses.string(),
+               map.posesAreOfKeyframes() ? "T_world_ref of the keyframes"
+                                         : "poses of the rig, interpolated");
   }
   fmt::print("{} keyframes, {} points, hash {}; written to {}\n", map.trajectory().size(),
              made.points, made.hash, arguments.out.string());

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
 #include "event_fusion/engine.h"
@@ -41,15 +41,6 @@ std::optional<MapFile> kindOf(const fs::path& out) {
   return is_folder ? std::optional(MapFile::kColmap) : std::nullopt;
 }
 
-void writeTo(const fs::path& out, const std::function<void(std::ostream&)>& write) {
-  writeAtomically(out, [&](const fs::path& temporary) {
-    std::ofstream stream(temporary, std::ios::binary);
-    write(stream);
-    stream.close();
-    if (!stream) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
-}
-
 /// The points of a map, slab by slab: the memory does not grow with the map.
 class SlabMap {
  public:
@@ -68,7 +59,6 @@ class SlabMap {
       made_.points += slab.size();
       hash.add(slab);
     });
-    map.requirePoints(made_.points);
     made_.hash = hash.finish();
   }
 
@@ -87,10 +77,11 @@ class SlabMap {
 
 ExportedMap writePcdOf(const SessionMap& map, const fs::path& out) {
   SlabMap slabs(map, out, {});
-  writeTo(out, [&](std::ostream& stream) {
-    writePcdHeader(stream, slabs.made().points, slabs.origin());
-    slabs.visit([&](const MapCloud& slab) { writePcdPoints(stream, slab); });
-  });
+  map.requirePoints(slabs.made().points);
+  writeAtomically(out, byStream([&](std::ostream& stream) {
+                    writePcdHeader(stream, slabs.made().points, slabs.origin());
+                    slabs.visit([&](const MapCloud& slab) { writePcdPoints(stream, slab); });
+                  }));
   return slabs.made();
 }
 
@@ -114,8 +105,9 @@ Json reportOf(const SessionMap& map, const ExportedMap& made) {
                  {"map_hash", made.hash}};
   const SessionFile& first = *map.sessions().front();
   const Json before = Json::parse(first.report(), nullptr, false);
-  const bool is_whole = map.sessions().size() == 1 && first.keyframes() == map.trajectory().size();
-  if (is_whole && before.is_object() && before.contains("quality")) {
+  const bool is_same = map.sessions().size() == 1 && map.what().sets.empty() &&
+                       map.what().poses.empty() && first.keyframes() == map.trajectory().size();
+  if (is_same && before.is_object() && before.contains("quality")) {
     report["quality"] = before["quality"];
   }
   return report;
@@ -141,30 +133,33 @@ MapSnapshot writePage(const SessionMap& map, const fs::path& out) {
                         *pictures,
                         view,
                         report.dump(-1, ' ', false, Json::error_handler_t::replace)};
-  writeTo(out, [&](std::ostream& stream) { writeMapPage(stream, page); });
+  writeAtomically(out, byStream([&](std::ostream& stream) { writeMapPage(stream, page); }));
   return made;
 }
 
 ExportedMap writeSession(const SessionMap& map, const fs::path& out) {
-  ExportedMap made;
-  writeAtomically(out, [&](const fs::path& temporary) {
-    SessionWriter session(temporary, runIn(map));
-    made = SlabMap(map, out, [&](std::size_t, const KeyframeDepthMap& keyframe) {
-             session.add(keyframe);
-           }).made();
-    session.addPoses(map.trajectory());
-    session.finish(reportOf(map, made).dump(2, ' ', false, Json::error_handler_t::replace));
-  });
+  AtomicFile file(out);
+  SessionWriter session(file.temporary(), runIn(map));
+  const ExportedMap made = SlabMap(map, out, [&](std::size_t, const KeyframeDepthMap& keyframe) {
+                             session.add(keyframe);
+                           }).made();
+  session.addPoses(map.trajectory());
+  session.finish(reportOf(map, made).dump(2, ' ', false, Json::error_handler_t::replace));
+  file.replace();
   return made;
 }
 
 MapSnapshot writeColmap(const SessionMap& map, const fs::path& out) {
   NewFolder folder(out.has_filename() ? out : out.parent_path());
   ColmapModel model(folder.temporary());
-  MapSnapshot made = map.snapshot(false, [&](std::size_t, const KeyframeDepthMap& keyframe) {
-    model.add(keyframe, map.pointsOf(keyframe));
-  });
-  model.finish(*made.points, map.options().cloud.voxel_size_m);
+  std::set<std::size_t> left_out;
+  MapSnapshot made = map.snapshot(
+      false,
+      [&](std::size_t, const KeyframeDepthMap& keyframe) {
+        model.add(keyframe, map.pointsOf(keyframe));
+      },
+      &left_out);
+  model.finish(*made.points, map.options().cloud.voxel_size_m, left_out);
   folder.finish();
   return made;
 }
@@ -204,6 +199,7 @@ ExportedMap exportSession(const SessionMap& map, const fs::path& out) {
       throw std::runtime_error(out.string() + ": the session itself: expected another name");
     }
   }
+  if (map.trajectory().empty()) map.requirePoints(0);
   const auto kind = kindOf(out);
   if (kind == MapFile::kPcd) return writePcdOf(map, out);
   if (kind == MapFile::kSession) return writeSession(map, out);

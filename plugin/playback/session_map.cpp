@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -58,43 +58,65 @@ void raiseProbability(double min_probability, DepthMap& map) {
   }
 }
 
-/// Returns T_world_ref of a session's keyframes from a file: see SessionExport::poses.
+/// Returns the pose nearest to a time. @param poses sorted by time, at least one.
+const StampedPose& nearestPose(const std::vector<StampedPose>& poses, std::int64_t t_ns) {
+  const auto after = std::lower_bound(
+      poses.begin(), poses.end(), t_ns,
+      [](const StampedPose& pose, std::int64_t wanted) { return pose.t_ns < wanted; });
+  if (after == poses.begin()) return *after;
+  if (after == poses.end() || t_ns - std::prev(after)->t_ns < after->t_ns - t_ns) {
+    return *std::prev(after);
+  }
+  return *after;
+}
+
+/// The poses of a session's keyframes by a file: see SessionExport::poses.
+struct CorrectedPoses {
+  std::vector<StampedPose> T_world_ref;
+  bool are_of_keyframes = true;  ///< false: the file has poses of the rig.
+};
+
 /// @throws std::runtime_error naming a keyframe without a pose.
-std::vector<StampedPose> correctedPoses(const SessionFile& session, const fs::path& file,
-                                        const TrajectoryOptions& options) {
-  constexpr std::int64_t kSameNs = 1'000;
+CorrectedPoses correctedPoses(const SessionFile& session, const fs::path& file,
+                              const TrajectoryOptions& options) {
+  constexpr std::int64_t kSameNs = 1'000'000;  // some write milliseconds
   const bool is_simplemap = file.extension() == ".simplemap";
-  const std::vector<StampedPose> given =
+  std::vector<StampedPose> given =
       is_simplemap ? mrptLibrary(file.string() + ": a simplemap").readSimpleMap(file)
                    : readPoses(file);
-  std::vector<StampedPose> T_world_ref = session.poses(false);
-  const auto isAt = [](const StampedPose& a, const StampedPose& b) {
-    return std::abs(a.t_ns - b.t_ns) <= kSameNs;
-  };
-  if (std::equal(given.begin(), given.end(), T_world_ref.begin(), T_world_ref.end(), isAt)) {
-    for (std::size_t i = 0; i < given.size(); ++i) {
-      T_world_ref[i].T_world_rig = given[i].T_world_rig;
-    }
-    return T_world_ref;
-  }
-  if (is_simplemap) {
-    throw std::runtime_error(
-        fmt::format("{}: its {} keyframes are not the {} of {}: expected one at the time of each",
-                    file.string(), given.size(), T_world_ref.size(), session.path().string()));
-  }
+  std::stable_sort(given.begin(), given.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
+  if (given.empty()) throw std::runtime_error(file.string() + ": no pose");
+  CorrectedPoses corrected{session.poses(false)};
+  const auto found = std::count_if(
+      corrected.T_world_ref.begin(), corrected.T_world_ref.end(), [&](const StampedPose& pose) {
+        return std::abs(nearestPose(given, pose.t_ns).t_ns - pose.t_ns) <= kSameNs;
+      });
+  // A trajectory of the rig has poses between the keyframes, too.
+  corrected.are_of_keyframes = is_simplemap || 2 * static_cast<std::size_t>(found) > given.size();
   Trajectory trajectory(options);
-  for (const StampedPose& pose : given) trajectory.add(pose);
-  for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
-    const std::optional<Rigid3> T_world_rig = trajectory.poseAt(T_world_ref[i].t_ns);
-    if (!T_world_rig) {
-      throw std::runtime_error(fmt::format(
-          "{}: no pose at {} s, the time of keyframe {}: it has {} poses from {} s to {} s",
-          file.string(), formatSeconds(T_world_ref[i].t_ns), i, given.size(),
-          formatSeconds(given.front().t_ns), formatSeconds(given.back().t_ns)));
-    }
-    T_world_ref[i].T_world_rig = *T_world_rig * session.keyframe(i).T_rig_ref;
+  for (const StampedPose& pose : given) {
+    if (!corrected.are_of_keyframes) trajectory.add(pose);
   }
-  return T_world_ref;
+  for (std::size_t i = 0; i < corrected.T_world_ref.size(); ++i) {
+    StampedPose& pose = corrected.T_world_ref[i];
+    std::optional<Rigid3> T_world_ref;
+    if (corrected.are_of_keyframes) {
+      const StampedPose& nearest = nearestPose(given, pose.t_ns);
+      if (std::abs(nearest.t_ns - pose.t_ns) <= kSameNs) T_world_ref = nearest.T_world_rig;
+    } else if (const auto T_world_rig = trajectory.poseAt(pose.t_ns)) {
+      T_world_ref = *T_world_rig * session.keyframe(i).T_rig_ref;
+    }
+    if (!T_world_ref) {
+      throw std::runtime_error(fmt::format(
+          "{}: no pose at {} s, the time of keyframe {}: it has {} poses{} from {} s to {} s",
+          file.string(), formatSeconds(pose.t_ns), i, given.size(),
+          corrected.are_of_keyframes ? " of keyframes" : "", formatSeconds(given.front().t_ns),
+          formatSeconds(given.back().t_ns)));
+    }
+    pose.T_world_rig = *T_world_ref;
+  }
+  return corrected;
 }
 
 }  // namespace
@@ -130,7 +152,7 @@ void SessionMap::openSessions() {
       throw std::runtime_error(
           file.string() +
           ": its run did not end, and its poses are not refined yet: expected a "
-          "run that ended (map --resume), or the tracker's poses (--poses tracker)");
+          "run that ended (map --resume), or the tracker's poses (--poses tracker, refined=False)");
     }
   }
 }
@@ -173,9 +195,17 @@ void SessionMap::chooseKeyframes() {
   what_.T_first_this.resize(sessions_.size() - 1);
   for (std::size_t s = 0; s < sessions_.size(); ++s) {
     const SessionFile& session = *sessions_[s];
-    std::vector<StampedPose> T_world_ref =
-        what_.poses.empty() ? session.poses(what_.refined)
-                            : correctedPoses(session, what_.poses, options_.mapper.trajectory);
+    std::vector<StampedPose> T_world_ref = session.poses(what_.refined);
+    if (!what_.poses.empty()) {
+      CorrectedPoses corrected = correctedPoses(session, what_.poses, options_.mapper.trajectory);
+      poses_are_of_keyframes_ = corrected.are_of_keyframes;
+      T_world_ref = std::move(corrected.T_world_ref);
+    }
+    if (options_.late_fusion && session.keyframe(0).camera_maps.empty()) {
+      throw std::runtime_error(session.path().string() +
+                               ": has no maps of single cameras, which fusion.late of the first "
+                               "session needs: expected sessions with the same fusion.late");
+    }
     for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
       if (!what_.limits.contain(T_world_ref[i].t_ns)) continue;
       chosen_.push_back({s, i});
@@ -187,25 +217,80 @@ void SessionMap::chooseKeyframes() {
   }
 }
 
-/// Registers the chosen keyframes of the last session with those before it.
+namespace {
+
+/// Returns the square of the distance to the nearest keyframe that looks in a similar direction,
+/// and its index. Infinity: there is none.
+std::pair<double, std::size_t> nearestView(const Rigid3& T_world_ref,
+                                           const std::vector<StampedPose>& others,
+                                           std::size_t end) {
+  constexpr double kMinCosine = 0.5;
+  std::pair<double, std::size_t> nearest{std::numeric_limits<double>::infinity(), 0};
+  const Eigen::Vector3d forward = T_world_ref.rotation * Eigen::Vector3d::UnitZ();
+  for (std::size_t i = 0; i < end; ++i) {
+    const Rigid3& other = others[i].T_world_rig;
+    const double squared = (other.translation - T_world_ref.translation).squaredNorm();
+    if (squared >= nearest.first) continue;
+    if (forward.dot(other.rotation * Eigen::Vector3d::UnitZ()) >= kMinCosine)
+      nearest = {squared, i};
+  }
+  return nearest;
+}
+
+/// Returns at most `most` of a list, evenly.
+template <typename Value>
+std::vector<Value> someOf(const std::vector<Value>& all, std::size_t most) {
+  std::vector<Value> some;
+  const std::size_t count = std::min(all.size(), most);
+  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
+  return some;
+}
+
+}  // namespace
+
+/// Registers the chosen keyframes of the last session with those before it: those of its
+/// keyframes that are nearest to them, and their surroundings.
 void SessionMap::registerSession(std::size_t s) {
   const auto before = static_cast<std::size_t>(
       std::find_if(chosen_.begin(), chosen_.end(),
                    [s](const Chosen& chosen) { return chosen.session == s; }) -
       chosen_.begin());
-  const auto clouds = [&](std::size_t begin, std::size_t end, std::size_t most) {
-    std::vector<PosedCloud> some;
-    for (std::size_t i = 0; i < std::min(end - begin, most); ++i) {
-      const std::size_t at = begin + i * (end - begin) / std::min(end - begin, most);
-      some.push_back({RegistrationCloud(keyframe(at), options_.refinement.refiner.points),
-                      T_world_ref_[at].T_world_rig});
-    }
-    return some;
-  };
+  if (before == 0 || before == chosen_.size()) {
+    throw std::runtime_error(sessions_[s]->path().string() +
+                             ": cannot be registered: --t0 and --t1 choose no keyframe of it, or "
+                             "none before it");
+  }
   constexpr std::size_t kMostMoved = 60, kMostFixed = 300;  // 0.6 MB each
+  std::vector<std::pair<double, std::size_t>> by_distance;
+  for (std::size_t i = before; i < chosen_.size(); ++i) {
+    by_distance.emplace_back(nearestView(T_world_ref_[i].T_world_rig, T_world_ref_, before).first,
+                             i);
+  }
+  std::sort(by_distance.begin(), by_distance.end());
+  by_distance.resize(
+      std::min(by_distance.size(), std::max(4 * kMostMoved, by_distance.size() / 4)));
+  std::vector<PosedCloud> moved, fixed;
+  const auto add = [&](std::size_t i, std::vector<PosedCloud>& clouds) {
+    clouds.push_back({RegistrationCloud(keyframe(i), options_.refinement.refiner.points),
+                      T_world_ref_[i].T_world_rig});
+  };
+  std::set<std::size_t> around;
+  for (const auto& [distance, i] : someOf(by_distance, kMostMoved)) {
+    add(i, moved);
+    const std::size_t nearest =
+        nearestView(T_world_ref_[i].T_world_rig, T_world_ref_, before).second;
+    constexpr std::size_t kAround = 10;
+    for (std::size_t k = nearest < kAround ? 0 : nearest - kAround;
+         k < std::min(before, nearest + kAround + 1); ++k) {
+      around.insert(k);
+    }
+  }
+  for (const std::size_t i :
+       someOf(std::vector<std::size_t>(around.begin(), around.end()), kMostFixed)) {
+    add(i, fixed);
+  }
   try {
-    registrations_.push_back(
-        registerMap(clouds(0, before, kMostFixed), clouds(before, chosen_.size(), kMostMoved)));
+    registrations_.push_back(registerMap(fixed, moved));
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(sessions_[s]->path().string() + ": " + error.what());
   }
@@ -218,16 +303,12 @@ void SessionMap::registerSession(std::size_t s) {
 }
 
 void SessionMap::storePoses() const {
-  SessionWriter::addGeneration(*sessions_.front(), corrected_);
+  SessionWriter::addGeneration(sessions_.front()->path(), corrected_);
 }
 
 KeyframeDepthMap SessionMap::keyframe(std::size_t at) const {
   const auto& [session, number] = chosen_[at];
   KeyframeDepthMap keyframe = sessions_[session]->keyframe(number);
-  if (options_.late_fusion && keyframe.camera_maps.empty()) {
-    throw std::runtime_error(sessions_[session]->path().string() +
-                             ": has no maps of single cameras, which fusion.late needs");
-  }
   raiseProbability(minProbability(options_), keyframe.map);
   for (CameraDepthMap& of_one : keyframe.camera_maps) {
     raiseProbability(minProbability(options_), of_one.map);
@@ -250,15 +331,18 @@ struct Range {
 
   Range() = default;
   Range(const std::vector<ViewPoint>& points, const Rigid3& T_world_ref, double voxel_size_m) {
+    constexpr double kMaxIndex = 9e18;  // a point beyond it is an outlier, or rejected
     for (const ViewPoint& point : points) {
       const double x = (T_world_ref * point.p_ref.cast<double>()).x();
-      const auto index = static_cast<std::int64_t>(std::floor(x / voxel_size_m));
+      const auto index = static_cast<std::int64_t>(
+          std::clamp(std::floor(x / voxel_size_m), -kMaxIndex, kMaxIndex));
       first = std::min(first, index);
       last = std::max(last, index);
     }
   }
   double shareBelow(std::int64_t x) const {
-    return static_cast<double>(x - first) / static_cast<double>(last - first + 1);
+    const auto begin = static_cast<double>(first);
+    return (static_cast<double>(x) - begin) / (static_cast<double>(last) - begin + 1);
   }
 };
 
@@ -272,7 +356,7 @@ std::set<std::size_t> SessionMap::visitSlabs(
   std::vector<Range> ranges(chosen_.size());
   Range all;
   std::int64_t begin = std::numeric_limits<std::int64_t>::min(), end = begin;
-  /// Returns whether a keyframe has points in the slab, or checks those of one that has.
+  /// Returns whether a keyframe has points in the slab, or checks points of one that has.
   const auto reaches = [&](std::size_t i) {
     const bool checks = options_.cloud.consistency.consistency != Consistency::kNone;
     const std::size_t around = checks ? GlobalCloud::kMaxNumberDifference : 0;
@@ -284,10 +368,10 @@ std::set<std::size_t> SessionMap::visitSlabs(
   double voxels_per_x = 0;  // of the last slab
   for (bool is_first = true; end != kEnd; is_first = false) {
     begin = std::exchange(end, kEnd);
-    // A guess, so that few keyframes are read that the slab does not have at its end.
+    // A guess of the slab's end: without it, points would be read that are cut off later.
     if (!is_first) {
       const double width = 1.2 * static_cast<double>(max_voxels) / voxels_per_x;
-      if (width < static_cast<double>(all.last - begin)) {
+      if (width < static_cast<double>(all.last) - static_cast<double>(begin)) {
         end = begin + 1 + static_cast<std::int64_t>(width);
       }
     }
@@ -366,7 +450,8 @@ MapCloud::Ptr SessionMap::cloudOf(const Eigen::Vector3f& origin,
   return inside;
 }
 
-MapSnapshot SessionMap::snapshot(bool keeps_keyframes, const OnKeyframe& on_keyframe) const {
+MapSnapshot SessionMap::snapshot(bool keeps_keyframes, const OnKeyframe& on_keyframe,
+                                 std::set<std::size_t>* left_out) const {
   MapSnapshot map;
   map.trajectory = T_world_ref_;
   const auto keep = [&](std::size_t i, const KeyframeDepthMap& keyframe) {
@@ -375,15 +460,18 @@ MapSnapshot SessionMap::snapshot(bool keeps_keyframes, const OnKeyframe& on_keyf
     map.keyframes.push_back({T_world_ref_[i].t_ns, T_world_ref_[i].T_world_rig,
                              std::make_shared<const std::vector<ViewPoint>>(pointsOf(keyframe))});
   };
-  for (const std::size_t bad : visitSlabs(kOneSlab, keep, [&](std::vector<CloudPoint> points) {
-         CloudOrigin origin(options_.cloud.voxel_size_m);
-         origin.add(points);
-         map.points = cloudOf(origin.origin(), points);
-       })) {
+  const std::set<std::size_t> all_bad =
+      visitSlabs(kOneSlab, keep, [&](const std::vector<CloudPoint>& points) {
+        CloudOrigin origin(options_.cloud.voxel_size_m);
+        origin.add(points);
+        map.points = cloudOf(origin.origin(), points);
+      });
+  for (const std::size_t bad : all_bad) {
     if (keeps_keyframes) {
       map.keyframes[bad].points = std::make_shared<const std::vector<ViewPoint>>();
     }
   }
+  if (left_out != nullptr) *left_out = all_bad;
   requirePoints(map.points->size());
   return map;
 }

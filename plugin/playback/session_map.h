@@ -40,17 +40,16 @@ std::optional<std::filesystem::path> sessionAt(const std::filesystem::path& path
 
 /// A map to make again from session files, without the recording.
 struct SessionExport {
-  /// One after the other: the keyframes of the next session follow those of the one before it, and
-  /// the options are those of the first one.
+  /// One after the other: the keyframes of the next session follow those of the one before it. The
+  /// options are those of the first one, and the highest depth.min_probability of all.
   std::vector<std::filesystem::path> sessions;
   /// "map.voxel_size_m=0.02": options of [map], and a higher depth.min_probability.
   std::vector<std::string> sets;
   TimeLimits limits;       ///< Keyframes whose t_ref is outside are left out.
   std::optional<Box> box;  ///< Points outside are left out.
   bool refined = true;     ///< false: the poses are the tracker's.
-  /// Poses that replace those of the keyframes. A simplemap: T_world_ref. Others: T_world_ref, if
-  /// there is exactly one at the t_ref of each keyframe (as in trajectory.txt); else those of the
-  /// rig, interpolated. Empty: none.
+  /// Poses that replace those of the keyframes. In a simplemap, or if most of the poses lie at a
+  /// t_ref, as in trajectory.txt: T_world_ref. Else those of the rig, interpolated. Empty: none.
   std::filesystem::path poses;
   /// Of the second session and further ones; none: identity.
   std::vector<std::optional<Rigid3>> T_first_this;
@@ -76,6 +75,8 @@ class SessionMap {
   /// The registrations of the second session and further ones, by option.
   const std::vector<MapRegistration>& registrations() const { return registrations_; }
 
+  /// Returns whether SessionExport::poses has poses of the keyframes; false: of the rig.
+  bool posesAreOfKeyframes() const { return poses_are_of_keyframes_; }
   /// Adds SessionExport::poses to the session, as one more generation.
   void storePoses() const;
 
@@ -92,7 +93,7 @@ class SessionMap {
   /// Reads the keyframes again for each slab, but for those that do not reach it.
   /// @param max_voxels of a slab in the memory: it takes about 0.4 kB each.
   /// @param on_keyframe gets each keyframe once.
-  /// @return keyframes without points in the map: see MapOptions::min_keyframe_quality.
+  /// @return keyframes without points in the map: see EventFusionOptions::min_keyframe_quality.
   std::set<std::size_t> visitSlabs(
       std::size_t max_voxels, const OnKeyframe& on_keyframe,
       const std::function<void(std::vector<CloudPoint>)>& on_slab) const;
@@ -100,7 +101,9 @@ class SessionMap {
   /// Makes the map in the memory.
   /// @param keeps_keyframes whether it has the points of each keyframe.
   /// @throws std::runtime_error if there is no point.
-  MapSnapshot snapshot(bool keeps_keyframes, const OnKeyframe& on_keyframe = {}) const;
+  /// @param left_out if given, gets what `visitSlabs` returns.
+  MapSnapshot snapshot(bool keeps_keyframes, const OnKeyframe& on_keyframe = {},
+                       std::set<std::size_t>* left_out = nullptr) const;
   /// Returns points of the map in their order, without those outside the box.
   /// @param origin of the whole map: `CloudOrigin`.
   MapCloud::Ptr cloudOf(const Eigen::Vector3f& origin, const std::vector<CloudPoint>& points) const;
@@ -123,6 +126,7 @@ class SessionMap {
   std::vector<Chosen> chosen_;
   std::vector<StampedPose> T_world_ref_;  // of the chosen keyframes
   std::vector<StampedPose> corrected_;    // of all, by SessionExport::poses
+  bool poses_are_of_keyframes_ = true;
   std::vector<MapRegistration> registrations_;
 };
 

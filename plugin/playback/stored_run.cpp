@@ -115,7 +115,7 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
       difference = error.what() + std::string(": expected a file that can be read, or no --resume");
       continue;
     }
-    if (found.session->keyframes() == 0) continue;
+    if (found.session->keyframes() == 0 || found.session->run().contains("exported_from")) continue;
     if (const auto differences = differencesOf(found.session->run(), run); !differences.empty()) {
       if (difference.empty()) {
         difference = fmt::format(

@@ -195,8 +195,10 @@ struct MapHasher::State {
   Sha256 hash;
   std::vector<Row> last;  ///< The points with the largest x: the next part may have others.
 
+  std::string bytes;  ///< Of a row.
+
   void add(const Row& row) {
-    std::string bytes;
+    bytes.clear();
     for (const double value : row) appendLittleEndian(bytes, value);
     hash.add(bytes);
   }

@@ -2,6 +2,7 @@
 #include "plugin/session_file/session_file.h"
 
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zstd.h>
@@ -56,6 +57,11 @@ FileHandle::FileHandle(std::filesystem::path path, int flags)
 }
 
 FileHandle::~FileHandle() { ::close(file_); }
+
+void FileHandle::lock() {
+  if (::flock(file_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  throw std::runtime_error("cannot write " + path_.string() + ": another program writes it");
+}
 
 std::uint64_t FileHandle::size() const {
   struct stat status {};
@@ -313,10 +319,12 @@ SessionWriter::SessionWriter(const std::filesystem::path& path, int flags)
     : file_(path, O_RDWR | flags),
       mcap_(topics(), [this](std::uint64_t position, const std::string& bytes) {
         file_.append(position, bytes);
-      }) {}
+      }) {
+  file_.lock();
+}
 
 SessionWriter::SessionWriter(const std::filesystem::path& path, const nlohmann::ordered_json& run)
-    : SessionWriter(path, O_CREAT | O_TRUNC) {
+    : SessionWriter(path, O_CREAT) {  // the first bytes cut the file
   using Json = nlohmann::ordered_json;
   mcap_.begin();
   Json versioned = {{"session", kVersion}};
@@ -353,15 +361,20 @@ void SessionWriter::take(const SessionFile& file, const std::vector<std::uint64_
   file_.append(mcap_.position() - index.size(), index);  // the index of the last chunk may be torn
 }
 
-void SessionWriter::addGeneration(const SessionFile& file,
+void SessionWriter::addGeneration(const std::filesystem::path& path,
                                   const std::vector<StampedPose>& T_world_ref) {
+  SessionWriter writer(path, 0);
+  const SessionFile file(path);
+  if (T_world_ref.size() != file.keyframes()) {
+    throw std::runtime_error(fmt::format("{}: {} poses: expected one for each of its {} keyframes",
+                                         path.string(), T_world_ref.size(), file.keyframes()));
+  }
   std::vector<std::uint64_t> chunks = {file.run_chunk_.value()};
   for (const auto* more : {&file.keyframes_, &file.poses_}) {
     chunks.insert(chunks.end(), more->begin(), more->end());
   }
   if (file.report_) chunks.push_back(*file.report_);
   std::sort(chunks.begin(), chunks.end());
-  SessionWriter writer(file.path(), 0);
   writer.take(file, chunks);
   writer.addPoses(T_world_ref);
   writer.mcap_.end();

@@ -30,6 +30,9 @@ class FileHandle {
 
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const;
+  /// Keeps the file from other writers, until it is closed, if the file system can do that.
+  /// @throws std::runtime_error naming the file if another program has it.
+  void lock();
   /// Returns bytes; fewer at the end of the file. @throws std::runtime_error naming the file.
   std::string read(std::uint64_t position, std::uint64_t size) const;
   /// Cuts the file at a position, appends bytes there, and waits until the disk has them. After an
@@ -115,7 +118,9 @@ class SessionWriter {
   /// Adds the report and the index.
   void finish(const std::string& report_json);
   /// Adds a generation of poses to a file, one per keyframe; all else stays.
-  static void addGeneration(const SessionFile& file, const std::vector<StampedPose>& T_world_ref);
+  /// @throws std::runtime_error naming the file; also if another program writes it.
+  static void addGeneration(const std::filesystem::path& path,
+                            const std::vector<StampedPose>& T_world_ref);
 
   std::uint64_t bytes() const { return mcap_.position(); }
   double seconds() const { return seconds_; }  ///< Of `add`, with the waits for the disk.

@@ -148,7 +148,7 @@ class SessionMap:
         sets: Sequence[str],
         t0_ns: Optional[int],
         t1_ns: Optional[int],
-        box: Sequence[float],
+        box: Optional[Sequence[float]],
         refined: bool,
         poses: str,
         T_first_this: Sequence[npt.ArrayLike],

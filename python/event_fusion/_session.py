@@ -82,8 +82,8 @@ class Session:
         ----------
         voxel_size_m, min_keyframes, min_probability : float, int, float
             Edge of a voxel, metres; least support; least probability, which can only be raised. Default: as in the run.
-        box : array of six numbers
-            x0, y0, z0, x1, y1, z1: only the points inside, metres, world.
+        box : array (6,) or (2, 3)
+            The lower and the upper corner: only the points inside, metres, world.
         options : dict
             Further options of [map], such as ``{"map.consistency": "visibility"}``.
         t0, t1 : int
@@ -146,11 +146,19 @@ class Session:
                 write_poses(file, poses)
             else:
                 file = os.fspath(poses)
+                if not file:
+                    raise ValueError("poses = '': expected the name of a file, or (times, matrices)")
             self._map({}, None, None, None, True, poses=file).store_poses()
         self._file = _engine.SessionFile(self._path)
 
     def merge(
-        self, others: Sequence[Session], out: Path, *, transforms: Sequence[npt.ArrayLike] = (), register: bool = False
+        self,
+        others: Sequence[Session],
+        out: Path,
+        *,
+        transforms: Sequence[npt.ArrayLike] = (),
+        register: bool = False,
+        refined: bool = True,
     ) -> Session:
         """Write one session with the keyframes of this one and of others, without mapping.
 
@@ -164,6 +172,8 @@ class Session:
             T_first_this of the others, in their order; none: the identity.
         register : bool
             Correct the transforms by what the keyframes see: about 5 % of the scene's depth, and 3 degrees.
+        refined : bool
+            False: the poses are the tracker's.
 
         Returns
         -------
@@ -178,7 +188,7 @@ class Session:
         """
         if not str(os.fspath(out)).endswith(".mcap"):
             raise ValueError(f"out = {os.fspath(out)!r}: expected the name of a session, .mcap")
-        made = self._map({}, None, None, None, True, others=others, transforms=transforms, registers=register)
+        made = self._map({}, None, None, None, refined, others=others, transforms=transforms, registers=register)
         made.export(os.fspath(out))
         merged = Session(out)
         merged.registrations = made.registrations
@@ -199,9 +209,12 @@ class Session:
         if len(transforms) > len(others):
             raise ValueError(f"{len(transforms)} transforms: expected at most one for each of the {len(others)} others")
         sets = [f"{key}={text}" for key, text in option_texts(options).items()]
-        corners = [] if box is None else np.asarray(box, dtype=float).ravel().tolist()
+        corners = None if box is None else np.asarray(box, dtype=float)
+        if corners is not None and corners.shape not in ((6,), (2, 3)):
+            raise ValueError(f"box of shape {corners.shape}: expected six numbers, or two corners: (6,) or (2, 3)")
         paths = [self._path, *(other._path for other in others)]
-        return _engine.SessionMap(paths, sets, t0, t1, corners, refined, poses, list(transforms), registers)
+        values = None if corners is None else corners.ravel().tolist()
+        return _engine.SessionMap(paths, sets, t0, t1, values, refined, poses, list(transforms), registers)
 
     @property
     def run(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <stdexcept>
@@ -30,12 +29,7 @@ namespace fs = std::filesystem;
 constexpr double kCorner = 0.5;
 
 void write(const fs::path& path, const std::function<void(std::ostream&)>& fill) {
-  fillFile(path, path, [&](const fs::path& file) {
-    std::ofstream stream(file, std::ios::binary);
-    fill(stream);
-    stream.close();
-    if (!stream) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
+  fillFile(path, path, byStream(fill));
 }
 
 std::string nameOf(std::size_t image) { return fmt::format("{:06}.png", image); }
@@ -147,7 +141,13 @@ std::vector<ColmapModel::Track> ColmapModel::tracksOf(const MapCloud& cloud,
   return tracks;
 }
 
-void ColmapModel::finish(const MapCloud& cloud, double voxel_size_m) {
+void ColmapModel::finish(const MapCloud& cloud, double voxel_size_m,
+                         const std::set<std::size_t>& left_out) {
+  for (const std::size_t i : left_out) {
+    images_[i].is_left_out = true;
+    images_[i].pixels.clear();
+    fs::remove(folder_ / "images" / nameOf(i));
+  }
   const fs::path sparse = folder_ / "sparse" / "0";
   write(sparse / "cameras.txt", [&](std::ostream& stream) {
     stream << "# CAMERA_ID MODEL WIDTH HEIGHT FX FY CX CY\n";
@@ -179,6 +179,7 @@ void ColmapModel::finish(const MapCloud& cloud, double voxel_size_m) {
   write(sparse / "images.txt", [&](std::ostream& stream) {
     stream << "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# (X Y POINT3D_ID)...\n";
     for (std::size_t i = 0; i < images_.size(); ++i) {
+      if (images_[i].is_left_out) continue;
       const Rigid3 T_ref_world = images_[i].T_world_ref.T_world_rig.inverse();
       const Eigen::Quaterniond& q = T_ref_world.rotation;
       const Eigen::Vector3d& t = T_ref_world.translation;
@@ -202,6 +203,7 @@ void ColmapModel::writeTransforms() const {
   nlohmann::ordered_json all = {{"camera_model", "OPENCV"},
                                 {"ply_file_path", "sparse/0/points3D.ply"}};
   for (std::size_t i = 0; i < images_.size(); ++i) {
+    if (images_[i].is_left_out) continue;
     const ReferenceView& view = cameras_[images_[i].camera];
     const Rigid3& T_world_ref = images_[i].T_world_ref.T_world_rig;
     Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();

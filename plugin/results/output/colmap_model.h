@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include "mapping/geometry/reference_view.h"
@@ -34,8 +35,9 @@ class ColmapModel {
   /// @throws std::runtime_error if the keyframe has no events, or a file cannot be written.
   void add(const KeyframeDepthMap& keyframe, const std::vector<ViewPoint>& points);
   /// Writes the other files. A pixel belongs to the point of its voxel.
+  /// @param left_out keyframes whose points are not in the map: their pictures are removed.
   /// @throws std::runtime_error naming a file that cannot be written.
-  void finish(const MapCloud& cloud, double voxel_size_m);
+  void finish(const MapCloud& cloud, double voxel_size_m, const std::set<std::size_t>& left_out);
 
  private:
   struct Pixel {
@@ -47,6 +49,7 @@ class ColmapModel {
     StampedPose T_world_ref;
     std::size_t camera;
     std::vector<Pixel> pixels;
+    bool is_left_out = false;
   };
   struct Track;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/results/output/map_output.h"
 
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
@@ -19,17 +18,6 @@
 
 namespace efm {
 namespace {
-
-/// Returns a function that writes a file; `write` puts the content into a stream.
-std::function<void(const std::filesystem::path&)> byStream(
-    std::function<void(std::ostream&)> write) {
-  return [write = std::move(write)](const std::filesystem::path& path) {
-    std::ofstream file(path, std::ios::binary);
-    write(file);
-    file.close();
-    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
-  };
-}
 
 /// Writes a file. After an error it is not there.
 void write(const std::filesystem::path& path,
