@@ -311,6 +311,7 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
     ++counts_.windows_without_events;
     return std::nullopt;
   }
+  if (keyframeMapper().leavesOut(window, trajectory_)) return std::nullopt;
   auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, times);
   if (!keyframe) {
     ++counts_.keyframes_without_pose;

@@ -141,6 +141,11 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
       ++keyframes_;
       blur_ = earlier->blur_watch;
       sequence_maximum_.add(earlier->max_confidence);
+      if (options_.event_images && earlier->event_images.empty()) {  // they are not stored
+        for (const CameraEvents& camera : selectedEvents(events)) {
+          earlier->event_images.push_back(eventImageOf(camera));
+        }
+      }
       return earlier;
     }
   }
@@ -180,6 +185,14 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
     }
   }
   return keyframe;
+}
+
+bool KeyframeMapper::leavesOut(const Window& window, const Trajectory& trajectory) {
+  if (!options_.only_keyframes || options_.only_keyframes->contains(keyframes_)) return false;
+  if (!trajectory.poseAt(window.t_ref_ns)) return false;
+  ++keyframes_;
+  if (options_.on_left_out) options_.on_left_out(window);
+  return true;
 }
 
 std::vector<CameraEvents> KeyframeMapper::selectedEvents(

@@ -11,10 +11,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <utility>
 
 #include "mapping/base/option.h"
+#include "mapping/base/text.h"
 #include "mapping/base/thread_arena.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/kernels.h"
@@ -46,7 +48,13 @@ int SpaceSweepOptions::threadsOrCores() const {
   // The host of this process limits the number of threads, also a requested number.
   const auto allowed = static_cast<int>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  return std::max(1, std::min(threads.value_or(allowed), allowed));
+  if (threads) return std::max(1, std::min(*threads, allowed));
+  for (const char* name : {"SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE"}) {  // of this job
+    const char* const text = std::getenv(name);
+    const auto processors = parseNumber<int>(text == nullptr ? "" : text);
+    if (processors && *processors > 0) return std::min(*processors, allowed);
+  }
+  return std::max(1, allowed);
 }
 
 VotingKernel SpaceSweepOptions::kernelOrFastest() const { return kernel.value_or(fastestKernel()); }
@@ -177,7 +185,7 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
-  TileVolume not_added;  // a plane that the peaks do not get
+  TileVolume not_added;            // a plane that the peaks do not get
   std::vector<TilePeaks> cameras;  // empty if not requested
   std::vector<std::uint64_t>
       interpolated;  // by camera: VoteCounts::interpolated, in units of weight
@@ -246,8 +254,10 @@ class TiledSweep {
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
     std::vector<TilePeaks> cameras(cameras_.size(), peaks);
     return {std::vector<TileRays>(rays_.inputs()),
-            TileFusion(options_.fusion, inputs_, keep, kernel_), std::move(peaks),
-            TileVolume(1, kPixels), std::move(cameras),
+            TileFusion(options_.fusion, inputs_, keep, kernel_),
+            std::move(peaks),
+            TileVolume(1, kPixels),
+            std::move(cameras),
             std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 

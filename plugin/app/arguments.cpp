@@ -11,6 +11,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/commands.h"
+#include "plugin/app/program.h"
 #include "plugin/options/option_file.h"
 #include "plugin/options/tracker_fault_keys.h"
 #include "plugin/recordings/streams/time_unit.h"
@@ -312,10 +313,9 @@ void requireKeyframeLength(const TrackerFaults& faults) {
       "(seconds)");
 }
 
-void addMap(CLI::App& app, Run& run) {
-  CLI::App& command = *app.add_subcommand(
-      "map", "Map a whole recording: keyframe depth maps and one point cloud, map.pcd");
-  auto arguments = argumentsOf(command, run, runMap);
+namespace {
+
+void addMapOptions(CLI::App& command, const std::shared_ptr<MapArguments>& arguments) {
   addMappingArguments(command, *arguments);
   addTimeLimits(command, arguments->times);
   command.add_flag("--resume", arguments->resume,
@@ -331,7 +331,77 @@ void addMap(CLI::App& app, Run& run) {
                   "Draw the growing map after each keyframe, without a screen: frame_000001.png, … "
                   "in DIR, with the trajectory, the newest depth map and rates")
       ->type_name("DIR");
+}
+
+}  // namespace
+
+void addMap(CLI::App& app, Run& run) {
+  CLI::App& command = *app.add_subcommand(
+      "map", "Map a whole recording: keyframe depth maps and one point cloud, map.pcd");
+  auto arguments = argumentsOf(command, run, runMap);
+  addMapOptions(command, arguments);
+  CLI::Option* const source = command.get_option("SOURCE")->required(false);
+  command
+      .add_option("--plan", arguments->plan,
+                  "Make one shard of this plan (event-fusion plan), into --out; the plan has all "
+                  "other arguments")
+      ->type_name("FILE")
+      ->excludes(source);
+  command
+      .add_option("--shard", arguments->shard,
+                  "Its number, from 0 (default: that of GNU parallel, Slurm, Kubernetes or AWS "
+                  "Batch)")
+      ->needs("--plan")
+      ->type_name("K");
+  command.parse_complete_callback([arguments] {
+    if (!arguments->plan.empty()) return;
+    if (arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");
+    takeConfig(*arguments);
+  });
+}
+
+MapArguments mapArgumentsOf(const std::vector<std::string>& words) {
+  CLI::App app("", "event-fusion");
+  CLI::App& command = *app.add_subcommand("map");
+  auto arguments = std::make_shared<MapArguments>();
+  addMapOptions(command, arguments);
   command.parse_complete_callback([arguments] { takeConfig(*arguments); });
+  std::vector<std::string> reversed(words.rbegin(), words.rend());
+  reversed.emplace_back("map");
+  try {
+    app.parse(reversed);
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(errorText(app, error));
+  }
+  return *arguments;
+}
+
+void addShards(CLI::App& app, Run& run) {
+  CLI::App& plan = *app.add_subcommand("plan",
+                                       "Divide the map of a recording into shards, for several "
+                                       "machines or processes: plan RECORDING "
+                                       "[options of map] --shards N --out plan.json");
+  auto planned = argumentsOf(plan, run, runPlan);
+  plan.allow_extras();
+  plan.add_option("--shards", planned->shards, "Number of shards; 64 keyframes are not divided")
+      ->required()
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}))
+      ->type_name("N");
+  plan.add_option("-o,--out", planned->out, "The file to write")->required()->type_name("FILE");
+  addVerbosity(plan, planned->verbosity);
+  plan.parse_complete_callback([planned, &plan] { planned->words = plan.remaining(); });
+
+  CLI::App& join =
+      *app.add_subcommand("join", "Make the map of all shards of a plan: that of one run");
+  auto joined = argumentsOf(join, run, runJoin);
+  join.add_option("PLAN", joined->plan, "plan.json")->required()->type_name("FILE");
+  join.add_option("SHARD", joined->shards, "The folders of all shards, in any order")
+      ->required()
+      ->type_name("DIR");
+  join.add_option("-o,--out", joined->out, "Folder for the results, as of map")
+      ->required()
+      ->type_name("DIR");
+  addVerbosity(join, joined->verbosity);
 }
 
 void addDepth(CLI::App& app, Run& run) {

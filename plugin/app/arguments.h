@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin/app/commands.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/open/open_recording.h"
@@ -73,6 +74,8 @@ std::int64_t nanosecondsOf(const std::string& text, const std::string& name);
 void requireKeyframeLength(const TrackerFaults& faults);
 
 void addMap(CLI::App& app, Run& run);
+/// Adds `plan` and `join`.
+void addShards(CLI::App& app, Run& run);
 void addDepth(CLI::App& app, Run& run);
 
 /// Adds `evaluate` and its kinds: depth, map, trajectory.

@@ -155,8 +155,8 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
       "  2    the command line or an option file is wrong\n"
       "  130  stopped as requested (Ctrl-C)");
   Run run;
-  for (const auto add :
-       {addSimulate, addImport, addExport, addMap, addDepth, addEvaluate, addInfo, addView}) {
+  for (const auto add : {addSimulate, addImport, addExport, addMap, addDepth, addShards,
+                         addEvaluate, addInfo, addView}) {
     add(app, run);
   }
   try {

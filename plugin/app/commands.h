@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/playback/map_job.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
@@ -102,7 +104,40 @@ struct MapArguments : MappingArguments {
   bool view = false;                    ///< Show the growing map in a window.
   std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
   bool resume = false;                  ///< Go on with the keyframes of an earlier run.
+  std::filesystem::path plan;           ///< Of `plan`: make one of its shards.
+  std::optional<std::size_t> shard;     ///< Its number, from 0.
+  nlohmann::ordered_json planned;       ///< See MapJob, as the next two.
+  std::optional<KeyframeRange> keyframes;
+  std::vector<std::shared_ptr<const SessionFile>> by_shards;
 };
+
+struct PlanArguments {
+  std::vector<std::string> words;  ///< The arguments of `map`.
+  std::size_t shards = 0;
+  std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// Returns the arguments of `map` for the words of a command line.
+/// @throws UsageError as the program does.
+MapArguments mapArgumentsOf(const std::vector<std::string>& words);
+/// Plans the map of the arguments of `map`. @throws as runMap.
+PlannedMap planMapOf(const MapArguments& arguments);
+
+/// `event-fusion plan`: finds the keyframes of a recording, and divides them into shards.
+int runPlan(const PlanArguments& arguments);
+/// `event-fusion map --plan`: makes the keyframes of a shard. A shard that is complete stays.
+int runShard(const MapArguments& arguments);
+
+struct JoinArguments {
+  std::filesystem::path plan;
+  std::vector<std::filesystem::path> shards;  ///< The folders of all shards, in any order.
+  std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// `event-fusion join`: makes the map of the keyframes of all shards: that of one run.
+int runJoin(const JoinArguments& arguments);
 
 struct DepthArguments : MappingArguments {
   /// Time of the reference view. Default: middle or end of the window, as the options say.

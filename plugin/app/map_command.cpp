@@ -118,7 +118,9 @@ int CommandLineJob::run() {
   if (const auto& error = result.error) {
     const auto wrong = error->wrong ? reader.wrongOption(*error->wrong) : std::nullopt;
     if (wrong) return fail(*wrong + error->more, kUsageStatus);
-    return fail(error->text + reader.origins(error->options));
+    return fail(
+        error->text + reader.origins(error->options),
+        !job.planned.is_null() && isTemporary(error->text) ? kTryAgainStatus : kFailedStatus);
   }
   if (report.stopped_at) {
     std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
@@ -126,7 +128,9 @@ int CommandLineJob::run() {
     return kInterruptedStatus;
   }
   const bool strict = arguments.strict && failStrictly(report.warnings);
-  if (result.isWithoutPoints()) return fail("the map has no point; its files are written");
+  if (result.isWithoutPoints() && !job.shard) {
+    return fail("the map has no point; its files are written");
+  }
   return strict ? kFailedStatus : 0;
 }
 
@@ -180,6 +184,7 @@ void rejectSessions(const RecordingSource& source) {
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
+  if (!arguments.plan.empty()) return runShard(arguments);
   rejectSessions(arguments.source);
   CommandLineJob command(arguments, OutputKind::kMap);
   MapJob& job = command.job;
@@ -187,6 +192,9 @@ int runMap(const MapArguments& arguments) {
   limits = RecordingTimes(job.sourceNow()).resolve(arguments.times);
   asUsage([&] { limits.validate(); });
   job.resume = arguments.resume;
+  job.planned = arguments.planned;
+  job.shard = arguments.keyframes;
+  job.by_shards = arguments.by_shards;
   Watchers watchers(arguments, job);
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe, const RecordingKeyframes& run) {
     watchers.add(run, keyframe);
@@ -195,6 +203,17 @@ int runMap(const MapArguments& arguments) {
   const int status = command.run();
   watchers.wait(command.interruption);
   return status;
+}
+
+PlannedMap planMapOf(const MapArguments& arguments) {
+  rejectSessions(arguments.source);
+  CommandLineJob command(arguments, OutputKind::kMap);
+  TimeLimits& limits = command.job.options.mapper.limits;
+  limits = RecordingTimes(command.job.sourceNow()).resolve(arguments.times);
+  return asUsage([&] {
+    limits.validate();
+    return planMap(command.job);
+  });
 }
 
 int runDepth(const DepthArguments& arguments) {

@@ -11,6 +11,8 @@ namespace efm {
 /// Exit statuses of the program, beside 0. Its help lists them.
 inline constexpr int kFailedStatus = 1;  ///< The job could not be done, or warnings with --strict.
 inline constexpr int kUsageStatus = 2;   ///< The command line or an option file is wrong.
+/// Of shards and their join: no memory, no room on the disk, another process at work, or a signal.
+inline constexpr int kTryAgainStatus = 75;      // EX_TEMPFAIL of sysexits.h
 inline constexpr int kInterruptedStatus = 130;  ///< Stopped as requested; as shells for SIGINT.
 
 /// The command line or an option file is wrong.

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -73,6 +74,15 @@ UserError userError(const std::exception& error) {
   if (const auto* hint = dynamic_cast<const OptionHint*>(&error)) result.options = hint->options;
   if (const auto* wrong = dynamic_cast<const OptionError*>(&error)) result.wrong = *wrong;
   return result;
+}
+
+bool isTemporary(std::string_view text) {
+  for (const std::string& sign :
+       {std::string("out of memory"), reasonNotWritten(ENOSPC), reasonNotWritten(EDQUOT),
+        std::string("another program writes"), std::string("is writing its result there")}) {
+    if (text.find(sign) != std::string_view::npos) return true;
+  }
+  return false;
 }
 
 std::string userMessage(const std::exception& error) { return userError(error).text; }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mapping/base/option.h"
@@ -30,6 +31,10 @@ struct UserError {
   }
 };
 UserError userError(const std::exception& error);
+
+/// Returns whether an error may be gone at the next try: no memory, no room on the disk, or another
+/// process at work. @param text of UserError.
+bool isTemporary(std::string_view text);
 
 /// Returns the text of the error only: one sentence, without the additions of libraries for
 /// programmers (call stacks, places in sources, names of types).

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
@@ -334,12 +335,21 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   requireNoStop(job);
   if (job.out.empty()) return look;
   if (has_session) addChosen(job.run, look.recording->rig(), job.options, look.first.chosen);
-  if (job.stored) {
-    requireSameChoice(*job.stored, job.run);
-    warnOfKernels(job);
-    keyframe.made_earlier = storedKeyframes(job.stored->session, job.stored->keyframes());
-    if (job.stored->is_complete) return look;
+  if (!job.planned.is_null()) requireSameChoice(job.planned, job.run, "the plan");
+  if (job.shard) {
+    keyframe.only_keyframes = job.shard;
+    job.options.refinement.enabled = false;  // it is for all keyframes together
   }
+  std::vector<StoredKeyframes> made;
+  if (job.stored) {
+    const SessionFile& stored = *job.stored->session;
+    requireSameChoice(stored.run(), job.run, stored.path().string());
+    warnOfKernels(job);
+    made.push_back({job.stored->session, job.stored->keyframes()});
+  }
+  for (const auto& session : job.by_shards) made.push_back({session, session->keyframes()});
+  if (!made.empty()) keyframe.made_earlier = storedKeyframes(std::move(made));
+  if (isComplete(job)) return look;
   folder.emplace(job.out, kind, job.stored ? job.stored->folder : std::filesystem::path());
   if (job.stored) {
     job.stored->removeOthers(folder->path());
@@ -364,6 +374,36 @@ void store(Job& job, const ResultFolder& folder, const KeyframeDepthMap& keyfram
   }
   job.session->add(keyframe);
 }
+
+/// Copies the images of keyframes that shards made: they have more than the session file.
+class ShardImages {
+ public:
+  explicit ShardImages(const Job& job) : shards_(job.by_shards) {}
+
+  /// Copies those of the next keyframe.
+  void copy(const std::filesystem::path& result, const KeyframeDepthMap& keyframe) {
+    const std::filesystem::path name =
+        std::filesystem::path("keyframes") / formatSeconds(keyframe.window.t_ref_ns);
+    while (copied_ == shards_.at(shard_)->keyframes()) {
+      ++shard_;
+      copied_ = 0;
+    }
+    const std::filesystem::path from = shards_[shard_]->path().parent_path() / name;
+    std::error_code error;
+    std::filesystem::create_directories(result / "keyframes", error);
+    std::filesystem::copy(from, result / name, std::filesystem::copy_options::recursive, error);
+    if (error) {
+      throw std::runtime_error(
+          fmt::format("cannot copy {} to {}: {}", from.string(), result.string(), error.message()));
+    }
+    ++copied_;
+  }
+
+ private:
+  const std::vector<std::shared_ptr<const SessionFile>>& shards_;
+  std::size_t shard_ = 0;
+  std::size_t copied_ = 0;  // of this shard
+};
 
 /// Fills in the report, except its points.
 void describe(Job& job, RecordingKeyframes& run, const RecordingCounts& counts,
@@ -548,10 +588,12 @@ MapResult mapInto(MapJob given) {
     KeyframePictures pictures(job.options.mapper.keyframe.planes);
     SessionCost cost;
     std::size_t stored = job.stored ? job.stored->keyframes() : 0;
+    ShardImages of_shards(job);
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
       const bool is_stored = stored > 0;
       if (is_stored) --stored;
-      if (!is_stored) output->writeKeyframe(keyframe);
+      if (!is_stored && job.by_shards.empty()) output->writeKeyframe(keyframe);
+      if (!job.by_shards.empty()) of_shards.copy(folder->path(), keyframe);
       if (!is_stored) store(job, *folder, keyframe);
       cost.depths += static_cast<std::uint64_t>(cv::countNonZero(keyframe.map.depth));
       sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
@@ -559,7 +601,12 @@ MapResult mapInto(MapJob given) {
     });
     RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
                            hostOf(job, "mapping"));
-    while (const auto keyframe = run.next()) {
+    std::uint64_t to_make = std::numeric_limits<std::uint64_t>::max();
+    if (job.shard) to_make = job.shard->end - job.shard->begin;
+    while (to_make > 0) {
+      const auto keyframe = run.next();
+      if (!keyframe) break;
+      --to_make;
       if (writes) writer.add(*keyframe);
       if (job.on_keyframe) job.on_keyframe(*keyframe, run);
     }
@@ -572,7 +619,9 @@ MapResult mapInto(MapJob given) {
       const StageScope scope(&exporting, &StageSeconds::map, Processors::kThis);
       map = run.map();
     }
+    const std::size_t judged = job.report.warnings.size();
     describe(job, run, look.recording->counts(), *map);
+    if (job.shard) job.report.warnings.resize(judged);  // the join judges all keyframes together
     describePoints(*map->points, job.report);
     const bool has_files = writes && job.report.counts.keyframes > 0;
     if (has_files) {
@@ -581,7 +630,7 @@ MapResult mapInto(MapJob given) {
     }
     job.report.times.real.map += exporting.real.map;
     job.report.times.cpu.output += exporting.cpu.map;
-    judgePoints(job.report, *map->points);
+    if (!job.shard) judgePoints(job.report, *map->points);
     endTimes(job);
     if (!result.complete_before.empty()) {
       result.map = std::move(map);
@@ -599,6 +648,39 @@ MapResult mapInto(MapJob given) {
   } catch (...) {
     rethrow(folder);
   }
+}
+
+PlannedMap planMap(MapJob given) {
+  Job job(std::move(given));
+  const EventFusionOptions& options = job.options;
+  const auto reject = [](const std::string& option) {
+    throw std::invalid_argument(
+        option +
+        ": a keyframe depends on all those before it, so that a map cannot be divided: "
+        "expected another value (map RECORDING makes it in one run)");
+  };
+  if (options.mapper.policy.policy == KeyframePolicyKind::kBaseline)
+    reject("keyframes.policy = baseline");
+  if (options.mapper.keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
+    reject("depth.max_confidence = sequence");
+  }
+  if (options.live.enabled) reject("live.enabled = true");
+  if (!options.session)
+    throw std::invalid_argument(
+        "output.session = false: shards need their sessions: expected true");
+  PlannedMap plan{runOf(job), {}};
+  Look look = lookAt(job);
+  addChosen(plan.run, look.recording->rig(), job.options, look.first.chosen);
+  job.options.mapper.keyframe.only_keyframes = KeyframeRange();
+  job.options.mapper.keyframe.on_left_out = [&](const Window& window) {
+    plan.keyframes.push_back(window);
+  };
+  RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
+                         interruptible(job, "planning"), "planning");
+  while (run.next()) {
+  }
+  if (run.error() && plan.keyframes.empty()) throw std::runtime_error(run.error()->text);
+  return plan;
 }
 
 MapResult mapWindowInto(MapJob given) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -14,6 +16,7 @@
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/event_fusion_options.h"
+#include "plugin/session_file/session_file.h"
 
 namespace efm {
 
@@ -28,6 +31,12 @@ struct MapJob {
   bool save_dsi = false;        ///< `mapWindowInto`: write the whole DSI.
   bool resume = false;          ///< `mapInto`: go on with the keyframes of an earlier run.
   bool needs_map = false;       ///< `mapInto`: give the map of a complete result, too.
+  /// `mapInto`: a part of a planned map. `planned` is PlannedMap::run: this job must have the same
+  /// options and recording. Either the keyframes of a shard are made, or all are there, made by
+  /// shards, and the job makes the map of them.
+  nlohmann::ordered_json planned;
+  std::optional<KeyframeRange> shard;
+  std::vector<std::shared_ptr<const SessionFile>> by_shards;
   /// Further files that are read: the result must not replace them.
   std::vector<std::filesystem::path> inputs;
   Verbosity verbosity = Verbosity::kQuiet;
@@ -81,6 +90,16 @@ struct MapResult {
 /// of range; std::exception if the options or the recording cannot be read, or a keyframe cannot be
 /// written.
 MapResult mapInto(MapJob job);
+
+/// What is known of a map before it is made.
+struct PlannedMap {
+  nlohmann::ordered_json run;     ///< SessionFile::run.
+  std::vector<Window> keyframes;  ///< The window of each.
+};
+/// Reads a recording to its end, and finds its keyframes without making them.
+/// @throws as `mapInto`; std::invalid_argument naming an option with which keyframes depend on all
+/// those before them.
+PlannedMap planMap(MapJob job);
 
 /// Maps the window `options.mapper.only_window`: all that `event-fusion depth` writes.
 /// @throws as `mapInto`; Interrupted if `stop` returns true before the keyframe is made.

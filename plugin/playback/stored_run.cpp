@@ -95,6 +95,7 @@ Json runOf(const MapJob& job) {
   if (const auto& size = reader.sensor_size)
     run["reading"]["sensor_size"] = {size->width, size->height};
   run["perturbation"] = asJson(source.faults);
+  if (job.shard) run["shard"] = {job.shard->begin, job.shard->end};
   // As a file has it: names need not be UTF-8.
   return Json::parse(run.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
@@ -118,10 +119,11 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
     if (found.session->keyframes() == 0 || found.session->run().contains("exported_from")) continue;
     if (const auto differences = differencesOf(found.session->run(), run); !differences.empty()) {
       if (difference.empty()) {
-        difference = fmt::format(
-            "{} holds {} keyframes of another run: {}: expected the same options and recording, or "
-            "no --resume",
-            file.string(), found.session->keyframes(), fmt::join(differences, "; "));
+        difference =
+            fmt::format("{} holds {} keyframes of another run: {}: expected {}", file.string(),
+                        found.session->keyframes(), fmt::join(differences, "; "),
+                        job.shard ? "a folder of its own for each shard of each plan"
+                                  : "the same options and recording, or no --resume");
       }
       continue;
     }
@@ -130,7 +132,8 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
   }
   if (!best && !difference.empty()) throw std::runtime_error(difference);
   if (!best) {
-    notes.push_back(job.out.string() + ": no keyframe is stored: the map begins anew");
+    if (!job.shard)
+      notes.push_back(job.out.string() + ": no keyframe is stored: the map begins anew");
     return best;
   }
   best->is_complete = best->folder == folders.front() && best->session->isComplete() &&
@@ -147,15 +150,18 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
   return best;
 }
 
-void requireSameChoice(const StoredRun& stored, const Json& run) {
-  Json before = stored.session->run(), now = run;
-  for (Json* of : {&before, &now}) (*of)["given"] = of->value("options", Json());
+void requireSameChoice(const Json& earlier, const Json& run, const std::string& name) {
+  Json before = earlier, now = run;
+  for (Json* of : {&before, &now}) {
+    (*of)["given"] = of->value("options", Json());
+    of->erase("shard");
+  }
   const std::vector<std::string> differences = differencesOf(before, now);
   if (differences.empty()) return;
   throw std::runtime_error(
-      fmt::format("{}: other options were chosen for the stored keyframes: {}: expected the same "
-                  "machine and libraries, or no --resume",
-                  stored.session->path().string(), fmt::join(differences, "; ")));
+      fmt::format("{}: it is of other options, or of another recording: {}: expected the same "
+                  "recording, machine and libraries",
+                  name, fmt::join(differences, "; ")));
 }
 
 void StoredRun::removeOthers(const fs::path& result) const {
@@ -167,27 +173,33 @@ void StoredRun::removeOthers(const fs::path& result) const {
 }
 
 std::function<std::optional<KeyframeDepthMap>(const Window&)> storedKeyframes(
-    std::shared_ptr<const SessionFile> session, std::size_t keyframes) {
+    std::vector<StoredKeyframes> sessions) {
   struct Cursor {
-    std::size_t next = 0;
+    std::size_t session = 0, next = 0;
     std::optional<KeyframeDepthMap> waiting;
   };
-  return [session = std::move(session), keyframes, cursor = std::make_shared<Cursor>()](
+  return [sessions = std::move(sessions), cursor = std::make_shared<Cursor>()](
              const Window& window) -> std::optional<KeyframeDepthMap> {
-    if (!cursor->waiting && cursor->next < keyframes) {
-      cursor->waiting = session->keyframe(cursor->next++);
-      cursor->waiting->T_world_ref = cursor->waiting->T_odom_ref;
+    auto& [session, next, waiting] = *cursor;
+    while (!waiting && session < sessions.size()) {
+      if (next == sessions[session].count) {
+        ++session;
+        next = 0;
+        continue;
+      }
+      waiting = sessions[session].session->keyframe(next++);
+      waiting->T_world_ref = waiting->T_odom_ref;
     }
-    if (!cursor->waiting) return std::nullopt;
-    const Window& stored = cursor->waiting->window;
+    if (!waiting) return std::nullopt;
+    const Window& stored = waiting->window;
     if (stored.t0_ns == window.t0_ns && stored.t1_ns == window.t1_ns) {
-      return std::exchange(cursor->waiting, std::nullopt);
+      return std::exchange(waiting, std::nullopt);
     }
     if (window.t0_ns < stored.t0_ns) return std::nullopt;  // it had no keyframe
     throw std::runtime_error(fmt::format(
         "{}: keyframe {} is of the window from {} s to {} s: expected the window from {} s to {} s "
         "(map without --resume)",
-        session->path().string(), cursor->next, formatSeconds(stored.t0_ns),
+        sessions[session].session->path().string(), next, formatSeconds(stored.t0_ns),
         formatSeconds(stored.t1_ns), formatSeconds(window.t0_ns), formatSeconds(window.t1_ns)));
   };
 }

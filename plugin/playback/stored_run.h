@@ -43,12 +43,20 @@ struct StoredRun {
 std::optional<StoredRun> findStored(const MapJob& job, const nlohmann::ordered_json& run,
                                     std::vector<std::string>& notes);
 
-/// @throws std::runtime_error if the chosen options differ from those of the stored keyframes.
-void requireSameChoice(const StoredRun& stored, const nlohmann::ordered_json& run);
+/// @throws std::runtime_error if the chosen options differ from those of an earlier run.
+/// @param name of the earlier run, for the error.
+void requireSameChoice(const nlohmann::ordered_json& earlier, const nlohmann::ordered_json& run,
+                       const std::string& name);
 
-/// Returns the source of the first stored keyframes for KeyframeMapperOptions::made_earlier. It
-/// throws std::runtime_error if a keyframe is not among the windows of this run.
+/// Stored keyframes of a session: the first ones.
+struct StoredKeyframes {
+  std::shared_ptr<const SessionFile> session;
+  std::size_t count = 0;
+};
+/// Returns the source of the keyframes of sessions, one after the other, for
+/// KeyframeMapperOptions::made_earlier. It throws std::runtime_error if a keyframe is not among the
+/// windows of this run.
 std::function<std::optional<KeyframeDepthMap>(const Window&)> storedKeyframes(
-    std::shared_ptr<const SessionFile> session, std::size_t keyframes);
+    std::vector<StoredKeyframes> sessions);
 
 }  // namespace efm

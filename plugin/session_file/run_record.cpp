@@ -167,7 +167,7 @@ Json fingerprintOf(const std::vector<fs::path>& inputs, const fs::path& out) {
 
 std::vector<std::string> differencesOf(const Json& before, const Json& now) {
   std::vector<std::string> differences;
-  for (const char* key : {"version", "given", "limits", "reading", "perturbation"}) {
+  for (const char* key : {"version", "given", "limits", "reading", "perturbation", "shard"}) {
     const std::string name = std::string(key) == "given" ? "" : key;
     compare(name, before.value(key, Json()), now.value(key, Json()), differences);
   }

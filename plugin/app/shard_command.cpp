@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <stdexcept>
+
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "plugin/app/commands.h"
+#include "plugin/app/program.h"
+#include "plugin/playback/session_map.h"
+#include "plugin/playback/stored_run.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kPlanVersion = 1;
+
+/// The content of plan.json.
+struct Plan {
+  fs::path file;
+  fs::path folder;                 ///< In which the words hold.
+  std::vector<std::string> words;  ///< The arguments of `map`.
+  Json run;
+  std::vector<KeyframeRange> shards;
+
+  static Plan read(const fs::path& file);
+  void write(const std::vector<Window>& keyframes) const;
+  /// Returns the arguments of `map`, in the folder of the plan, for a result.
+  MapArguments argumentsFor(const fs::path& out, Verbosity verbosity) const;
+};
+
+Plan Plan::read(const fs::path& file) {
+  try {
+    const Json json = Json::parse(readBytes(file));
+    const int version = json.at("plan").get<int>();
+    if (version != kPlanVersion) {
+      throw std::runtime_error(fmt::format("version {}: expected {}", version, kPlanVersion));
+    }
+    Plan plan{file, json.at("folder").get<std::string>(), json.at("arguments"), json.at("run"), {}};
+    for (const Json& shard : json.at("shards")) {
+      plan.shards.push_back(
+          {shard.at("begin").get<std::uint64_t>(), shard.at("end").get<std::uint64_t>()});
+    }
+    return plan;
+  } catch (const Json::exception& error) {
+    throw std::runtime_error(file.string() + ": no plan (event-fusion plan): " + error.what());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+}
+
+void Plan::write(const std::vector<Window>& keyframes) const {
+  Json json = {{"plan", kPlanVersion},          {"folder", folder.string()}, {"arguments", words},
+               {"keyframes", keyframes.size()}, {"shards", Json::array()},   {"run", run}};
+  for (const KeyframeRange& shard : shards) {
+    Json one = {{"begin", shard.begin}, {"end", shard.end}};
+    if (shard.begin < shard.end) {
+      one["t0"] = formatSeconds(keyframes[shard.begin].t0_ns);
+      one["t1"] = formatSeconds(keyframes[shard.end - 1].t1_ns);
+    }
+    json["shards"].push_back(std::move(one));
+  }
+  writeAtomically(file, byStream([&](std::ostream& stream) {
+                    stream << json.dump(1, ' ', false, Json::error_handler_t::replace) << '\n';
+                  }));
+}
+
+MapArguments Plan::argumentsFor(const fs::path& out, Verbosity verbosity) const {
+  const fs::path absolute = fs::absolute(out);
+  std::error_code error;
+  fs::current_path(folder, error);
+  if (error) {
+    throw std::runtime_error(file.string() + ": its folder " + folder.string() +
+                             " is not here: expected the same paths on all machines");
+  }
+  MapArguments arguments = mapArgumentsOf(words);
+  arguments.out = absolute;
+  arguments.planned = run;
+  if (verbosity != Verbosity::kNormal) arguments.verbosity = verbosity;
+  return arguments;
+}
+
+/// Returns the number of a shard: that of the command line, or of the system that started it.
+std::size_t shardNumber(const std::optional<std::size_t>& given, std::size_t count) {
+  std::optional<std::size_t> number = given;
+  std::string name = "--shard";
+  for (const auto& [variable, first] : {std::pair("PARALLEL_SEQ", 1),
+                                        {"SLURM_ARRAY_TASK_ID", 0},
+                                        {"JOB_COMPLETION_INDEX", 0},
+                                        {"AWS_BATCH_JOB_ARRAY_INDEX", 0}}) {
+    const char* const text = std::getenv(variable);
+    if (number || text == nullptr) continue;
+    name = variable;
+    const auto value = parseNumber<std::int64_t>(text);
+    if (!value || *value < first) throw UsageError(name + "=" + text + ": expected a number");
+    number = static_cast<std::size_t>(*value - first);
+  }
+  if (!number) throw UsageError("--shard: expected a number, from 0");
+  if (*number < count) return *number;
+  throw UsageError(fmt::format("{}: shard {}: expected 0 to {}", name, *number, count - 1));
+}
+
+/// Runs `map` for a shard or a join. @return 75 if the next try may succeed.
+int runPlanned(const MapArguments& arguments) {
+  try {
+    const int status = runMap(arguments);
+    return status == kInterruptedStatus ? kTryAgainStatus : status;
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Interrupted& interrupted) {
+    return fail(interrupted.what(), kTryAgainStatus);
+  } catch (const std::exception& error) {
+    const std::string text = userMessage(error);
+    return fail(text, isTemporary(text) ? kTryAgainStatus : kFailedStatus);
+  }
+}
+
+}  // namespace
+
+int runPlan(const PlanArguments& arguments) {
+  if (fs::exists(arguments.out) && !fs::is_regular_file(arguments.out)) {
+    throw UsageError("--out " + arguments.out.string() + ": expected the name of a file");
+  }
+  const MapArguments of_map = mapArgumentsOf(arguments.words);
+  if (!of_map.out.empty() || of_map.resume || of_map.view || !of_map.record_frames.empty()) {
+    throw UsageError("--resume, --view, --record-frames: are for one run, not for a plan");
+  }
+  const PlannedMap planned = planMapOf(of_map);
+  Plan plan{arguments.out, fs::current_path(), arguments.words, planned.run, {}};
+  const std::uint64_t keyframes = planned.keyframes.size();
+  const std::uint64_t block = KeyframeMapper::kBlockKeyframes;
+  const std::uint64_t blocks = (keyframes + block - 1) / block;
+  for (std::size_t k = 0; k < arguments.shards; ++k) {
+    // The first shards have one block more, so that the last ones are empty.
+    const auto begin_of = [&](std::size_t shard) {
+      const std::uint64_t begin =
+          shard * (blocks / arguments.shards) + std::min(shard, blocks % arguments.shards);
+      return std::min(begin * block, keyframes);
+    };
+    plan.shards.push_back({begin_of(k), begin_of(k + 1)});
+  }
+  plan.write(planned.keyframes);
+  if (arguments.verbosity == Verbosity::kQuiet) return 0;
+  const auto empty = std::count_if(plan.shards.begin(), plan.shards.end(),
+                                   [](const KeyframeRange& s) { return s.begin == s.end; });
+  fmt::print("{} keyframes in {} shards; written to {}\n", keyframes, plan.shards.size(),
+             arguments.out.string());
+  if (empty > 0) {
+    fmt::print("empty: the last {} of them: there are {} blocks of {} keyframes\n", empty, blocks,
+               block);
+  }
+  return 0;
+}
+
+int runShard(const MapArguments& arguments) {
+  const Plan plan = Plan::read(arguments.plan);
+  const std::size_t number = shardNumber(arguments.shard, plan.shards.size());
+  if (arguments.out.empty()) throw UsageError("--out: expected the folder of the shard");
+  const KeyframeRange keyframes = plan.shards[number];
+  if (keyframes.begin == keyframes.end) {
+    fmt::print("shard {} has no keyframe\n", number);
+    return 0;
+  }
+  MapArguments of_shard = plan.argumentsFor(arguments.out, arguments.verbosity);
+  of_shard.keyframes = keyframes;
+  of_shard.resume = true;
+  of_shard.strict = false;
+  return runPlanned(of_shard);
+}
+
+int runJoin(const JoinArguments& arguments) {
+  const Plan plan = Plan::read(arguments.plan);
+  std::vector<std::shared_ptr<const SessionFile>> by_shard(plan.shards.size());
+  std::vector<std::string> without;
+  for (const fs::path& folder : arguments.shards) {
+    const auto file = sessionAt(folder);
+    if (!file) {  // of an empty shard
+      without.push_back(folder.string());
+      continue;
+    }
+    const auto session = std::make_shared<const SessionFile>(fs::absolute(*file));
+    requireSameChoice(plan.run, session->run(), file->string());
+    const Json range = session->run().value("shard", Json());
+    const auto shard =
+        std::find_if(plan.shards.begin(), plan.shards.end(), [&](const KeyframeRange& s) {
+          return s.begin < s.end && range == Json{s.begin, s.end};
+        });
+    if (shard == plan.shards.end()) {
+      throw std::runtime_error(file->string() + ": no shard of " + plan.file.string());
+    }
+    if (session->keyframes() != shard->end - shard->begin) {
+      throw std::runtime_error(fmt::format(
+          "{}: {} of {} keyframes: expected a shard that ended (run it again: it goes on)",
+          file->string(), session->keyframes(), shard->end - shard->begin));
+    }
+    auto& place = by_shard[static_cast<std::size_t>(shard - plan.shards.begin())];
+    if (place) {
+      throw std::runtime_error(file->string() + ": the same shard as " + place->path().string());
+    }
+    place = session;
+  }
+  std::vector<std::size_t> missing;
+  std::vector<std::shared_ptr<const SessionFile>> all;
+  for (std::size_t k = 0; k < by_shard.size(); ++k) {
+    if (by_shard[k]) all.push_back(by_shard[k]);
+    if (!by_shard[k] && plan.shards[k].begin < plan.shards[k].end) missing.push_back(k);
+  }
+  if (!missing.empty()) {
+    throw std::runtime_error(fmt::format(
+        "shards {} are missing: expected the folders of all{}{}", fmt::join(missing, ", "),
+        without.empty() ? "" : "; no session.mcap is in ", fmt::join(without, ", ")));
+  }
+  MapArguments of_map = plan.argumentsFor(arguments.out, arguments.verbosity);
+  of_map.by_shards = std::move(all);
+  return runPlanned(of_map);
+}
+
+}  // namespace efm
