@@ -141,11 +141,6 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
       ++keyframes_;
       blur_ = earlier->blur_watch;
       sequence_maximum_.add(earlier->max_confidence);
-      if (options_.event_images && earlier->event_images.empty()) {  // they are not stored
-        for (const CameraEvents& camera : selectedEvents(events)) {
-          earlier->event_images.push_back(eventImageOf(camera));
-        }
-      }
       return earlier;
     }
   }

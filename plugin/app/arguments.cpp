@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "mapping/base/named_choice.h"
@@ -353,8 +354,19 @@ void addMap(CLI::App& app, Run& run) {
                   "Batch)")
       ->needs("--plan")
       ->type_name("K");
-  command.parse_complete_callback([arguments] {
-    if (!arguments->plan.empty()) return;
+  command.parse_complete_callback([arguments, command = &command] {
+    if (!arguments->plan.empty()) {
+      const std::set<std::string> own = {"help", "help-all", "plan",  "shard",
+                                         "out",  "force",    "quiet", "verbose"};
+      for (const CLI::Option* option : command->get_options()) {
+        if (option->count() == 0 ||
+            own.count(option->get_lnames().empty() ? "" : option->get_lnames().front()) > 0)
+          continue;
+        throw CLI::ValidationError(option->get_name(),
+                                   "the plan has it: expected --shard, --out and --force alone");
+      }
+      return;
+    }
     if (arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");
     takeConfig(*arguments);
   });
@@ -385,7 +397,7 @@ void addShards(CLI::App& app, Run& run) {
   plan.allow_extras();
   plan.add_option("--shards", planned->shards, "Number of shards; 64 keyframes are not divided")
       ->required()
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}))
+      ->check(between(1, 1e6, "1 to 1000000"))
       ->type_name("N");
   plan.add_option("-o,--out", planned->out, "The file to write")->required()->type_name("FILE");
   addVerbosity(plan, planned->verbosity);

@@ -153,6 +153,7 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
       "  0    the job is done\n"
       "  1    the job could not be done: data, files, disk, memory; or a warning, with --strict\n"
       "  2    the command line or an option file is wrong\n"
+      "  75   of map --plan and join: try again (memory, disk, another process, a signal)\n"
       "  130  stopped as requested (Ctrl-C)");
   Run run;
   for (const auto add : {addSimulate, addImport, addExport, addMap, addDepth, addShards,

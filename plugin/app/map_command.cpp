@@ -128,7 +128,7 @@ int CommandLineJob::run() {
     return kInterruptedStatus;
   }
   const bool strict = arguments.strict && failStrictly(report.warnings);
-  if (result.isWithoutPoints() && !job.shard) {
+  if (result.isWithoutPoints() && job.planned.is_null()) {
     return fail("the map has no point; its files are written");
   }
   return strict ? kFailedStatus : 0;
@@ -195,6 +195,7 @@ int runMap(const MapArguments& arguments) {
   job.planned = arguments.planned;
   job.shard = arguments.keyframes;
   job.by_shards = arguments.by_shards;
+  for (const auto& session : job.by_shards) job.inputs.push_back(session->path());
   Watchers watchers(arguments, job);
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe, const RecordingKeyframes& run) {
     watchers.add(run, keyframe);
@@ -210,10 +211,20 @@ PlannedMap planMapOf(const MapArguments& arguments) {
   CommandLineJob command(arguments, OutputKind::kMap);
   TimeLimits& limits = command.job.options.mapper.limits;
   limits = RecordingTimes(command.job.sourceNow()).resolve(arguments.times);
-  return asUsage([&] {
-    limits.validate();
-    return planMap(command.job);
-  });
+  const auto require = [&](const OptionError& error) {
+    if (const auto wrong = command.reader.wrongOption(error)) throw UsageError(*wrong);
+  };
+  try {
+    PlannedMap planned = asUsage([&] {
+      limits.validate();
+      return planMap(command.job);
+    });
+    if (planned.error && planned.error->wrong) require(*planned.error->wrong);
+    return planned;
+  } catch (const OptionError& error) {
+    require(error);
+    throw;
+  }
 }
 
 int runDepth(const DepthArguments& arguments) {

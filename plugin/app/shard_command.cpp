@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -50,8 +51,8 @@ Plan Plan::read(const fs::path& file) {
           {shard.at("begin").get<std::uint64_t>(), shard.at("end").get<std::uint64_t>()});
     }
     return plan;
-  } catch (const Json::exception& error) {
-    throw std::runtime_error(file.string() + ": no plan (event-fusion plan): " + error.what());
+  } catch (const Json::exception&) {
+    throw std::runtime_error(file.string() + ": no plan: expected a file of `event-fusion plan`");
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(file.string() + ": " + error.what());
   }
@@ -68,9 +69,7 @@ void Plan::write(const std::vector<Window>& keyframes) const {
     }
     json["shards"].push_back(std::move(one));
   }
-  writeAtomically(file, byStream([&](std::ostream& stream) {
-                    stream << json.dump(1, ' ', false, Json::error_handler_t::replace) << '\n';
-                  }));
+  writeAtomically(file, byStream([&](std::ostream& stream) { stream << json.dump(1) << '\n'; }));
 }
 
 MapArguments Plan::argumentsFor(const fs::path& out, Verbosity verbosity) const {
@@ -97,10 +96,12 @@ std::size_t shardNumber(const std::optional<std::size_t>& given, std::size_t cou
                                         {"JOB_COMPLETION_INDEX", 0},
                                         {"AWS_BATCH_JOB_ARRAY_INDEX", 0}}) {
     const char* const text = std::getenv(variable);
-    if (number || text == nullptr) continue;
+    if (number || text == nullptr || *text == '\0') continue;
     name = variable;
     const auto value = parseNumber<std::int64_t>(text);
-    if (!value || *value < first) throw UsageError(name + "=" + text + ": expected a number");
+    if (!value || *value < first) {
+      throw UsageError(fmt::format("{}={}: expected a number, from {}", name, text, first));
+    }
     number = static_cast<std::size_t>(*value - first);
   }
   if (!number) throw UsageError("--shard: expected a number, from 0");
@@ -126,11 +127,17 @@ int runPlanned(const MapArguments& arguments) {
 }  // namespace
 
 int runPlan(const PlanArguments& arguments) {
-  if (fs::exists(arguments.out) && !fs::is_regular_file(arguments.out)) {
-    throw UsageError("--out " + arguments.out.string() + ": expected the name of a file");
+  if (fs::exists(arguments.out)) Plan::read(arguments.out);  // nothing else is replaced
+  MapArguments of_map = mapArgumentsOf(arguments.words);
+  if (arguments.verbosity == Verbosity::kQuiet) of_map.verbosity = Verbosity::kQuiet;
+  for (const fs::path& file : of_map.source.files) {
+    if (fs::is_directory(file) && fs::exists(arguments.out.parent_path() / ".") &&
+        fs::equivalent(file, fs::absolute(arguments.out).parent_path())) {
+      throw UsageError("--out " + arguments.out.string() +
+                       ": lies in the recording's folder: expected another one");
+    }
   }
-  const MapArguments of_map = mapArgumentsOf(arguments.words);
-  if (!of_map.out.empty() || of_map.resume || of_map.view || !of_map.record_frames.empty()) {
+  if (of_map.resume || of_map.view || !of_map.record_frames.empty()) {
     throw UsageError("--resume, --view, --record-frames: are for one run, not for a plan");
   }
   const PlannedMap planned = planMapOf(of_map);
@@ -148,6 +155,7 @@ int runPlan(const PlanArguments& arguments) {
     plan.shards.push_back({begin_of(k), begin_of(k + 1)});
   }
   plan.write(planned.keyframes);
+  if (planned.error) return fail(planned.error->text);
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   const auto empty = std::count_if(plan.shards.begin(), plan.shards.end(),
                                    [](const KeyframeRange& s) { return s.begin == s.end; });
@@ -166,18 +174,24 @@ int runShard(const MapArguments& arguments) {
   if (arguments.out.empty()) throw UsageError("--out: expected the folder of the shard");
   const KeyframeRange keyframes = plan.shards[number];
   if (keyframes.begin == keyframes.end) {
-    fmt::print("shard {} has no keyframe\n", number);
+    if (arguments.verbosity != Verbosity::kQuiet) fmt::print("shard {} has no keyframe\n", number);
     return 0;
   }
   MapArguments of_shard = plan.argumentsFor(arguments.out, arguments.verbosity);
   of_shard.keyframes = keyframes;
   of_shard.resume = true;
   of_shard.strict = false;
+  of_shard.force |= arguments.force;
   return runPlanned(of_shard);
 }
 
 int runJoin(const JoinArguments& arguments) {
   const Plan plan = Plan::read(arguments.plan);
+  rlimit files{};  // each session is an open file
+  if (getrlimit(RLIMIT_NOFILE, &files) == 0) {
+    files.rlim_cur = files.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &files);
+  }
   std::vector<std::shared_ptr<const SessionFile>> by_shard(plan.shards.size());
   std::vector<std::string> without;
   for (const fs::path& folder : arguments.shards) {
@@ -187,7 +201,7 @@ int runJoin(const JoinArguments& arguments) {
       continue;
     }
     const auto session = std::make_shared<const SessionFile>(fs::absolute(*file));
-    requireSameChoice(plan.run, session->run(), file->string());
+    requireSameChoice(plan.run, session->run(), file->string(), "");
     const Json range = session->run().value("shard", Json());
     const auto shard =
         std::find_if(plan.shards.begin(), plan.shards.end(), [&](const KeyframeRange& s) {
@@ -196,10 +210,11 @@ int runJoin(const JoinArguments& arguments) {
     if (shard == plan.shards.end()) {
       throw std::runtime_error(file->string() + ": no shard of " + plan.file.string());
     }
-    if (session->keyframes() != shard->end - shard->begin) {
+    const std::size_t count = session->keyframes();
+    if (count != shard->end - shard->begin || session->keyframe(count - 1).after_stop) {
       throw std::runtime_error(fmt::format(
           "{}: {} of {} keyframes: expected a shard that ended (run it again: it goes on)",
-          file->string(), session->keyframes(), shard->end - shard->begin));
+          file->string(), count, shard->end - shard->begin));
     }
     auto& place = by_shard[static_cast<std::size_t>(shard - plan.shards.begin())];
     if (place) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -77,8 +78,10 @@ UserError userError(const std::exception& error) {
 }
 
 bool isTemporary(std::string_view text) {
+  if (text.find("cannot be created or the disk is full") != std::string_view::npos) return false;
   for (const std::string& sign :
        {std::string("out of memory"), reasonNotWritten(ENOSPC), reasonNotWritten(EDQUOT),
+        std::string(std::strerror(ENOSPC)), std::string(std::strerror(EDQUOT)),
         std::string("another program writes"), std::string("is writing its result there")}) {
     if (text.find(sign) != std::string_view::npos) return true;
   }

@@ -263,14 +263,25 @@ void findStored(Job& job) {
   }
 }
 
+/// Returns a kernel that agrees with another one bit for bit.
+std::string roundingOf(const std::string& kernel) { return kernel == "avx512" ? "avx2" : kernel; }
+
+/// Requires that a part of a planned map is of the same recording, options and rounding.
+void requirePlanned(const Job& job) {
+  requireSameChoice(job.planned, job.run, "the plan", "");
+  const std::string planned = job.planned.at("kernel"), now = job.run.at("kernel");
+  if (roundingOf(planned) == roundingOf(now)) return;
+  throw std::runtime_error(fmt::format(
+      "the plan is for the kernel {}, this machine has {}, which rounds in another way: expected "
+      "machines of one kind, or a plan with --set performance.kernel=sse4 or plain",
+      planned, now));
+}
+
 /// Warns if stored keyframes are of a kernel that rounds in another way.
 void warnOfKernels(Job& job) {
-  const auto rounding = [](const std::string& kernel) {
-    return kernel == "avx512" ? "avx2" : kernel;  // they agree bit for bit
-  };
   const std::string now(nameOf(job.options.mapper.keyframe.sweep.kernelOrFastest()));
   for (const std::string& kernel : job.stored->kernels) {
-    if (rounding(kernel) == rounding(now)) continue;
+    if (roundingOf(kernel) == roundingOf(now)) continue;
     addWarning(job.report.warnings, "mixed-kernels",
                "stored keyframes are by the kernel {}, the next ones by {}: they agree up to "
                "rounding (if all are of one: --set performance.kernel={} goes on exactly)",
@@ -298,7 +309,7 @@ void tellOfLeft(Job& job, const ResultFolder& folder) {
   if (folder.left().empty()) return;
   const std::string left = fmt::format("a run that did not end left {} keyframes in {}",
                                        countKeyframes(folder.left()), folder.left().string());
-  if (job.resume) {  // no part of the result
+  if (job.resume || !job.by_shards.empty()) {  // no part of the result
     if (job.note) job.note(left + ", which are removed when this result is complete");
     return;
   }
@@ -335,7 +346,7 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   requireNoStop(job);
   if (job.out.empty()) return look;
   if (has_session) addChosen(job.run, look.recording->rig(), job.options, look.first.chosen);
-  if (!job.planned.is_null()) requireSameChoice(job.planned, job.run, "the plan");
+  if (!job.planned.is_null()) requirePlanned(job);
   if (job.shard) {
     keyframe.only_keyframes = job.shard;
     job.options.refinement.enabled = false;  // it is for all keyframes together
@@ -343,7 +354,7 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   std::vector<StoredKeyframes> made;
   if (job.stored) {
     const SessionFile& stored = *job.stored->session;
-    requireSameChoice(stored.run(), job.run, stored.path().string());
+    requireSameChoice(stored.run(), job.run, stored.path().string(), ", or no --resume");
     warnOfKernels(job);
     made.push_back({job.stored->session, job.stored->keyframes()});
   }
@@ -384,18 +395,16 @@ class ShardImages {
   void copy(const std::filesystem::path& result, const KeyframeDepthMap& keyframe) {
     const std::filesystem::path name =
         std::filesystem::path("keyframes") / formatSeconds(keyframe.window.t_ref_ns);
-    while (copied_ == shards_.at(shard_)->keyframes()) {
+    while (shard_ < shards_.size() && copied_ == shards_[shard_]->keyframes()) {
       ++shard_;
       copied_ = 0;
     }
-    const std::filesystem::path from = shards_[shard_]->path().parent_path() / name;
-    std::error_code error;
-    std::filesystem::create_directories(result / "keyframes", error);
-    std::filesystem::copy(from, result / name, std::filesystem::copy_options::recursive, error);
-    if (error) {
-      throw std::runtime_error(
-          fmt::format("cannot copy {} to {}: {}", from.string(), result.string(), error.message()));
+    if (shard_ == shards_.size()) {
+      throw std::runtime_error("the recording has more keyframes than the plan: plan it again");
     }
+    const std::filesystem::path from = shards_[shard_]->path().parent_path() / name;
+    std::filesystem::create_directories(result / "keyframes");
+    std::filesystem::copy(from, result / name, std::filesystem::copy_options::recursive);
     ++copied_;
   }
 
@@ -620,6 +629,7 @@ MapResult mapInto(MapJob given) {
       map = run.map();
     }
     const std::size_t judged = job.report.warnings.size();
+    const std::optional<UserError> of_reading = run.error();
     describe(job, run, look.recording->counts(), *map);
     if (job.shard) job.report.warnings.resize(judged);  // the join judges all keyframes together
     describePoints(*map->points, job.report);
@@ -644,7 +654,7 @@ MapResult mapInto(MapJob given) {
       job.report.session = cost;
     }
     if (has_files) writePage(job, *output, *map, pictures);
-    return end(job, folder, std::move(map), run.error());
+    return end(job, folder, std::move(map), job.shard ? of_reading : run.error());
   } catch (...) {
     rethrow(folder);
   }
@@ -652,6 +662,7 @@ MapResult mapInto(MapJob given) {
 
 PlannedMap planMap(MapJob given) {
   Job job(std::move(given));
+  job.out.clear();
   const EventFusionOptions& options = job.options;
   const auto reject = [](const std::string& option) {
     throw std::invalid_argument(
@@ -668,7 +679,8 @@ PlannedMap planMap(MapJob given) {
   if (!options.session)
     throw std::invalid_argument(
         "output.session = false: shards need their sessions: expected true");
-  PlannedMap plan{runOf(job), {}};
+  PlannedMap plan;
+  plan.run = runOf(job);
   Look look = lookAt(job);
   addChosen(plan.run, look.recording->rig(), job.options, look.first.chosen);
   job.options.mapper.keyframe.only_keyframes = KeyframeRange();
@@ -679,7 +691,10 @@ PlannedMap planMap(MapJob given) {
                          interruptible(job, "planning"), "planning");
   while (run.next()) {
   }
-  if (run.error() && plan.keyframes.empty()) throw std::runtime_error(run.error()->text);
+  plan.error = run.error();
+  if (plan.keyframes.empty() && !plan.error) {
+    plan.error = UserError{"there is no keyframe (map RECORDING says why)"};
+  }
   return plan;
 }
 

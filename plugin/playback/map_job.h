@@ -93,8 +93,9 @@ MapResult mapInto(MapJob job);
 
 /// What is known of a map before it is made.
 struct PlannedMap {
-  nlohmann::ordered_json run;     ///< SessionFile::run.
-  std::vector<Window> keyframes;  ///< The window of each.
+  nlohmann::ordered_json run;      ///< SessionFile::run.
+  std::vector<Window> keyframes;   ///< The window of each.
+  std::optional<UserError> error;  ///< Why the recording was not read to its end.
 };
 /// Reads a recording to its end, and finds its keyframes without making them.
 /// @throws as `mapInto`; std::invalid_argument naming an option with which keyframes depend on all

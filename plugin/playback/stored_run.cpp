@@ -150,7 +150,8 @@ std::optional<StoredRun> findStored(const MapJob& job, const Json& run,
   return best;
 }
 
-void requireSameChoice(const Json& earlier, const Json& run, const std::string& name) {
+void requireSameChoice(const Json& earlier, const Json& run, const std::string& name,
+                       const std::string& remedy) {
   Json before = earlier, now = run;
   for (Json* of : {&before, &now}) {
     (*of)["given"] = of->value("options", Json());
@@ -160,8 +161,8 @@ void requireSameChoice(const Json& earlier, const Json& run, const std::string& 
   if (differences.empty()) return;
   throw std::runtime_error(
       fmt::format("{}: it is of other options, or of another recording: {}: expected the same "
-                  "recording, machine and libraries",
-                  name, fmt::join(differences, "; ")));
+                  "recording, machine and libraries{}",
+                  name, fmt::join(differences, "; "), remedy));
 }
 
 void StoredRun::removeOthers(const fs::path& result) const {
@@ -198,7 +199,7 @@ std::function<std::optional<KeyframeDepthMap>(const Window&)> storedKeyframes(
     if (window.t0_ns < stored.t0_ns) return std::nullopt;  // it had no keyframe
     throw std::runtime_error(fmt::format(
         "{}: keyframe {} is of the window from {} s to {} s: expected the window from {} s to {} s "
-        "(map without --resume)",
+        "(made anew in another folder, it is right)",
         sessions[session].session->path().string(), next, formatSeconds(stored.t0_ns),
         formatSeconds(stored.t1_ns), formatSeconds(window.t0_ns), formatSeconds(window.t1_ns)));
   };

@@ -44,9 +44,9 @@ std::optional<StoredRun> findStored(const MapJob& job, const nlohmann::ordered_j
                                     std::vector<std::string>& notes);
 
 /// @throws std::runtime_error if the chosen options differ from those of an earlier run.
-/// @param name of the earlier run, for the error.
+/// @param name of the earlier run, for the error. @param remedy a further one, for its end.
 void requireSameChoice(const nlohmann::ordered_json& earlier, const nlohmann::ordered_json& run,
-                       const std::string& name);
+                       const std::string& name, const std::string& remedy);
 
 /// Stored keyframes of a session: the first ones.
 struct StoredKeyframes {

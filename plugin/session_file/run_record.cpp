@@ -77,7 +77,9 @@ void addFilesIn(const fs::path& folder, const fs::path& except, std::vector<fs::
     const std::string name = path.filename().string();
     const bool is_out = isOneOf(name, except.filename().string()) &&
                         fs::equivalent(folder, except.parent_path(), error);
-    if (is_out || fs::exists(path / "run.lock", error)) continue;  // of a result
+    const bool is_result =
+        fs::exists(path / "run.lock", error) || fs::exists(path / "session.mcap", error);
+    if (is_out || is_result) continue;
     const fs::file_status status = entry.symlink_status(error);
     if (fs::is_directory(status)) {
       addFilesIn(path, except, files);
