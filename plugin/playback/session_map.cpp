@@ -84,16 +84,34 @@ CorrectedPoses correctedPoses(const SessionFile& session, const fs::path& file,
   std::vector<StampedPose> given =
       is_simplemap ? mrptLibrary(file.string() + ": a simplemap").readSimpleMap(file)
                    : readPoses(file);
-  std::stable_sort(given.begin(), given.end(),
-                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
   if (given.empty()) throw std::runtime_error(file.string() + ": no pose");
   CorrectedPoses corrected{session.poses(false)};
-  const auto found = std::count_if(
-      corrected.T_world_ref.begin(), corrected.T_world_ref.end(), [&](const StampedPose& pose) {
-        return std::abs(nearestPose(given, pose.t_ns).t_ns - pose.t_ns) <= kSameNs;
-      });
+  const auto is_same_time = [](const StampedPose& a, const StampedPose& b) {
+    return std::abs(a.t_ns - b.t_ns) <= kSameNs;
+  };
+  // In a merged session, two keyframes may have one time.
+  if (std::equal(given.begin(), given.end(), corrected.T_world_ref.begin(),
+                 corrected.T_world_ref.end(), is_same_time)) {
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      corrected.T_world_ref[i].T_world_rig = given[i].T_world_rig;
+    }
+    return corrected;
+  }
+  const auto is_earlier = [](const StampedPose& a, const StampedPose& b) {
+    return a.t_ns < b.t_ns;
+  };
+  std::stable_sort(given.begin(), given.end(), is_earlier);
+  std::vector<StampedPose> keyframes = corrected.T_world_ref;
+  std::stable_sort(keyframes.begin(), keyframes.end(), is_earlier);
   // A trajectory of the rig has poses between the keyframes, too.
-  corrected.are_of_keyframes = is_simplemap || 2 * static_cast<std::size_t>(found) > given.size();
+  std::size_t at_keyframes = 0, between = 0;
+  for (const StampedPose& pose : given) {
+    const bool is_within = pose.t_ns > keyframes.front().t_ns && pose.t_ns < keyframes.back().t_ns;
+    const bool is_at_keyframe = is_same_time(nearestPose(keyframes, pose.t_ns), pose);
+    if (is_at_keyframe) ++at_keyframes;
+    if (!is_at_keyframe && (is_within || keyframes.size() == 1)) ++between;
+  }
+  corrected.are_of_keyframes = is_simplemap || at_keyframes > between;
   Trajectory trajectory(options);
   for (const StampedPose& pose : given) {
     if (!corrected.are_of_keyframes) trajectory.add(pose);
@@ -103,7 +121,7 @@ CorrectedPoses correctedPoses(const SessionFile& session, const fs::path& file,
     std::optional<Rigid3> T_world_ref;
     if (corrected.are_of_keyframes) {
       const StampedPose& nearest = nearestPose(given, pose.t_ns);
-      if (std::abs(nearest.t_ns - pose.t_ns) <= kSameNs) T_world_ref = nearest.T_world_rig;
+      if (is_same_time(nearest, pose)) T_world_ref = nearest.T_world_rig;
     } else if (const auto T_world_rig = trajectory.poseAt(pose.t_ns)) {
       T_world_ref = *T_world_rig * session.keyframe(i).T_rig_ref;
     }

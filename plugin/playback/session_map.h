@@ -48,8 +48,9 @@ struct SessionExport {
   TimeLimits limits;       ///< Keyframes whose t_ref is outside are left out.
   std::optional<Box> box;  ///< Points outside are left out.
   bool refined = true;     ///< false: the poses are the tracker's.
-  /// Poses that replace those of the keyframes. In a simplemap, or if most of the poses lie at a
-  /// t_ref, as in trajectory.txt: T_world_ref. Else those of the rig, interpolated. Empty: none.
+  /// Poses that replace those of the keyframes. In a simplemap, or if most of the poses between
+  /// the first t_ref and the last lie at a t_ref, as in trajectory.txt: T_world_ref. Else those of
+  /// the rig, interpolated. Empty: none.
   std::filesystem::path poses;
   /// Of the second session and further ones; none: identity.
   std::vector<std::optional<Rigid3>> T_first_this;

@@ -282,6 +282,14 @@ def test_sessions_are_corrected_cut_and_merged(tmp_path):
     rows = pcd(whole / "map.pcd")
     inside = rows[(rows["x"] >= -0.2) & (rows["x"] <= 0.3)]
     assert 0 < len(inside) < len(rows) and pcd(tmp_path / "box.pcd").tobytes() == inside.tobytes()
+    # Some of a trajectory's keyframes, or fewer poses than keyframes, are not taken for the rig's poses.
+    lines = [line for line in (whole / "trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    (tmp_path / "fewer.txt").write_text("\n".join(lines[:2] + lines[3:]) + "\n")
+    words = [os.environ["EFM_EVENT_FUSION"], "export", str(noisy), "--out", str(tmp_path / "x.pcd"), "--poses"]
+    failed = subprocess.run([*words, str(tmp_path / "fewer.txt")], capture_output=True, text=True)
+    assert failed.returncode == 1 and "the time of keyframe 2: it has" in failed.stderr and "poses of keyframes" in failed.stderr
+    text = program("export", tmp_path / "early.mcap", "--out", tmp_path / "part.pcd", "--poses", whole / "trajectory.txt")
+    assert "T_world_ref of the keyframes" in text and (tmp_path / "part.pcd").stat().st_size > 0
     # A simplemap whose poses another program moved: those of the noisy session, and then the exact ones.
     program("export", noisy, "--out", tmp_path / "by_simplemap.pcd", "--poses", whole / "map.simplemap")
     rows, exact_rows = pcd(tmp_path / "by_simplemap.pcd"), pcd(tmp_path / "fixed.pcd")
