@@ -14,10 +14,15 @@ CloudOrigin::CloudOrigin(double resolution_m)
       // The step of floats from x to 2 x is at most x / 2^23.
       unit_m_(std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))))) {}
 
+constexpr double kNear = 0.4;  // of a unit
+
 void CloudOrigin::add(const std::vector<CloudPoint>& points) {
+  points_ += points.size();
   for (const CloudPoint& point : points) {
-    ++points_;
-    if (coarseStepAt(point.p_world.cwiseAbs().maxCoeff(), resolution_m_)) ++coarse_;
+    const double reach_m = point.p_world.cwiseAbs().maxCoeff();
+    if (reach_m < kNear * unit_m_) continue;  // it rounds to 0, and floats are fine enough
+    ++far_;
+    if (coarseStepAt(reach_m, resolution_m_)) ++coarse_;
     const Eigen::Array3d rounded = (point.p_world / unit_m_).array().round();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       ++counts_[axis][rounded[static_cast<Eigen::Index>(axis)]];
@@ -29,7 +34,9 @@ Eigen::Vector3f CloudOrigin::origin() const {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   if (coarse_ <= points_ / 1000) return origin.cast<float>();  // a few wrong points lie anywhere
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    auto median = counts_[axis].begin();
+    std::map<double, std::size_t> counts = counts_[axis];
+    counts[0] += points_ - far_;
+    auto median = counts.begin();
     for (std::size_t below = median->second; below <= points_ / 2; below += median->second) {
       ++median;
     }

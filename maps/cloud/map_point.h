@@ -76,7 +76,8 @@ class CloudOrigin {
   double resolution_m_, unit_m_;
   std::size_t points_ = 0;
   std::size_t coarse_ = 0;                               // points for which floats are too coarse
-  std::array<std::map<double, std::size_t>, 3> counts_;  // per axis, by rounded coordinates
+  std::size_t far_ = 0;                                  // points that may not round to 0
+  std::array<std::map<double, std::size_t>, 3> counts_;  // of these, by rounded coordinates
 };
 
 /// Returns the points in their order, with the origin of `CloudOrigin`.

@@ -187,12 +187,11 @@ int exportSessions(const ExportArguments& arguments) {
   for (std::size_t i = 0; i < map.registrations().size(); ++i) {
     const MapRegistration& found = map.registrations()[i];
     fmt::print(
-        "{}: registered, moved {:.2f} cm (sigma {:.2f}) and {:.3f} degrees (sigma {:.3f}); {} of "
-        "{} "
-        "pairs of keyframes agree\n",
+        "{}: registered, moved {:.2f} cm (sigma {:.2f}) and {:.3f} degrees (sigma {:.3f}); of {} "
+        "pairs of keyframes, {} agree\n",
         map.sessions()[i + 1]->path().string(), 100 * found.moved_m, 100 * found.sigma_m,
-        found.moved_rad / kRadiansPerDegree, found.sigma_rad / kRadiansPerDegree, found.pairs,
-        found.checked);
+        found.moved_rad / kRadiansPerDegree, found.sigma_rad / kRadiansPerDegree, found.checked,
+        found.pairs);
     const std::vector<double> pose = numbersIn(*map.what().T_first_this[i]);
     fmt::print("  T_first_this: {:.6f} (x y z qx qy qz qw)\n", fmt::join(pose, " "));
   }

@@ -172,25 +172,34 @@ class Watchers {
   double watched_s_ = 0;
 };
 
+/// The job of `map` within its time limits.
 /// @throws UsageError if the recording is a session, whose map is exported.
-void rejectSessions(const RecordingSource& source) {
-  for (const std::filesystem::path& file : source.files) {
-    if (!sessionAt(file) || std::filesystem::is_directory(file)) continue;
-    throw UsageError(file.string() + ": a session: its map is made again by `event-fusion export " +
-                     file.string() + " --out map.pcd`");
+struct MapCommand : CommandLineJob {
+  explicit MapCommand(const MapArguments& given)
+      : CommandLineJob(checked(given), OutputKind::kMap) {
+    TimeLimits& limits = job.options.mapper.limits;
+    limits = RecordingTimes(job.sourceNow()).resolve(given.times);
+    asUsage([&] { limits.validate(); });
   }
-}
+
+ private:
+  static const MapArguments& checked(const MapArguments& given) {
+    for (const std::filesystem::path& file : given.source.files) {
+      if (!sessionAt(file) || std::filesystem::is_directory(file)) continue;
+      throw UsageError(file.string() +
+                       ": a session: its map is made again by `event-fusion export " +
+                       file.string() + " --out map.pcd`");
+    }
+    return given;
+  }
+};
 
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
   if (!arguments.plan.empty()) return runShard(arguments);
-  rejectSessions(arguments.source);
-  CommandLineJob command(arguments, OutputKind::kMap);
+  MapCommand command(arguments);
   MapJob& job = command.job;
-  TimeLimits& limits = job.options.mapper.limits;
-  limits = RecordingTimes(job.sourceNow()).resolve(arguments.times);
-  asUsage([&] { limits.validate(); });
   job.resume = arguments.resume;
   job.planned = arguments.planned;
   job.shard = arguments.keyframes;
@@ -207,18 +216,12 @@ int runMap(const MapArguments& arguments) {
 }
 
 PlannedMap planMapOf(const MapArguments& arguments) {
-  rejectSessions(arguments.source);
-  CommandLineJob command(arguments, OutputKind::kMap);
-  TimeLimits& limits = command.job.options.mapper.limits;
-  limits = RecordingTimes(command.job.sourceNow()).resolve(arguments.times);
+  MapCommand command(arguments);
   const auto require = [&](const OptionError& error) {
     if (const auto wrong = command.reader.wrongOption(error)) throw UsageError(*wrong);
   };
   try {
-    PlannedMap planned = asUsage([&] {
-      limits.validate();
-      return planMap(command.job);
-    });
+    PlannedMap planned = asUsage([&] { return planMap(command.job); });
     if (planned.error && planned.error->wrong) require(*planned.error->wrong);
     return planned;
   } catch (const OptionError& error) {

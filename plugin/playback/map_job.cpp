@@ -610,12 +610,11 @@ MapResult mapInto(MapJob given) {
     });
     RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
                            hostOf(job, "mapping"));
-    std::uint64_t to_make = std::numeric_limits<std::uint64_t>::max();
-    if (job.shard) to_make = job.shard->end - job.shard->begin;
-    while (to_make > 0) {
+    const KeyframeRange all{0, std::numeric_limits<std::uint64_t>::max()};
+    const KeyframeRange range = job.shard.value_or(all);
+    for (std::uint64_t number = range.begin; number < range.end; ++number) {
       const auto keyframe = run.next();
       if (!keyframe) break;
-      --to_make;
       if (writes) writer.add(*keyframe);
       if (job.on_keyframe) job.on_keyframe(*keyframe, run);
     }
