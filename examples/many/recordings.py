@@ -4,8 +4,10 @@
 
   recordings.py jobs  LIST OUT [OPTION...]    writes OUT/jobs, a command per recording
   recordings.py run   OUT NAME ARGUMENT...    maps one recording to OUT/NAME
-  recordings.py table LIST OUT                prints the table; exit status 1 if a recording is not mapped
+  recordings.py table LIST OUT                prints the table, and writes it as OUT/index.html with pictures;
+                                              exit status 1 if a recording is not mapped
 """
+import html
 import json
 import os
 import re
@@ -14,12 +16,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import urllib.parse
 from pathlib import Path
 
 PROGRAM = os.environ.get("EVENT_FUSION") or "event-fusion"
 FINAL = (0, 1, 2)  # done, cannot be done, wrong options: another try would end in the same way
 TRY_AGAIN = 75  # exit status of `run` for all other statuses of the program
-COLUMNS = ("recording", "status", "keyframes", "points", "seconds", "reason")
+COLUMNS = ("recording", "status", "quality", "keyframes", "points", "seconds", "events/s", "reason")
+NUMBERS = COLUMNS[3:7]
 
 
 def fail(text):
@@ -70,7 +74,7 @@ def plain_quotes(line):
 def read_list(path):
     """Returns {name: arguments of `event-fusion map`} in the order of the list."""
     found = {}
-    used = dict.fromkeys(("jobs", "joblog", "lock", "log", "slurm", "table.txt"), "these scripts")
+    used = dict.fromkeys(("index.html", "jobs", "joblog", "lock", "log", "slurm", "table.txt"), "these scripts")
     try:
         lines = Path(path).read_text("utf-8-sig", "surrogateescape").split("\n")
     except OSError as error:
@@ -164,15 +168,17 @@ def row(out, name):
     status = done["status"]
     report = done["has_report"] and read_json(out / name / "report.json")
     if report:
-        cells.update(keyframes=report["keyframes"], points=report["points"],
-                     seconds=f"{report['seconds']['total']:.1f}")
+        seconds = report["seconds"]["total"]
+        cells.update(keyframes=report["keyframes"], points=report["points"], seconds=f"{seconds:.1f}",
+                     quality=report.get("quality", {}).get("word", "-"))
+        cells["events/s"] = f"{round(report['events']['read'] / max(seconds, 1e-3), -3):.0f}"
     if status == 0:
         cells["status"] = "mapped"
         warnings = {warning["name"] for warning in report["warnings"]} if report else set()
         reasons = ["warnings: " + ", ".join(sorted(warnings))] if warnings else []
         quality = report and report.get("quality")
         if quality and quality["word"] in ("doubtful", "wrong"):
-            reasons.insert(0, f"{quality['word']}: " + ", ".join(quality["reasons"]))
+            reasons.insert(0, ", ".join(quality["reasons"]))
         cells["reason"] = "; ".join(reasons) or "-"
     elif status == 130:
         cells.update(status="stopped", reason="stopped as requested")
@@ -183,14 +189,35 @@ def row(out, name):
     return cells
 
 
+def page(out, rows):
+    """Returns the table as a page: each recording with pictures of its map and depths, which open the map."""
+    lines = ["<!DOCTYPE html><meta charset=utf-8><title>Recordings</title>",
+             "<style>body{font:14px sans-serif} td,th{padding:4px 10px; text-align:left; vertical-align:top}",
+             "tr{border-top:1px solid #ccc} table{border-collapse:collapse} img{height:120px} td{max-width:30em} .failed,.wrong{color:#b00}",
+             ".doubtful,.partial{color:#a60} td.n{text-align:right}</style>",
+             f"<p>{sum(row['status'] == 'mapped' for row in rows)} of {len(rows)} recordings are mapped.</p><table><tr>",
+             *(f"<th>{column}</th>" for column in COLUMNS), "<th>map</th><th>depths</th></tr>"]
+    for cells in rows:
+        name = cells["recording"]
+        words = {"status": cells["status"], "quality": cells["quality"], **dict.fromkeys(NUMBERS, "n")}
+        lines.append("<tr>" + "".join(f'<td class="{words.get(column, "")}">{html.escape(str(cell))}</td>'
+                                      for column, cell in cells.items()))
+        for picture in ("map.png", "overview.png"):
+            links = [urllib.parse.quote(os.fsencode(f"{name}/{file}")) for file in ("map.html", picture)]
+            shown = f'<a href="{links[0]}"><img src="{links[1]}" loading=lazy></a>' if (out / name / picture).exists() else ""
+            lines.append(f"<td>{shown}</td>")
+    return "\n".join(lines) + "</table>\n"
+
+
 def table(list_file, out):
     rows = [row(out, name) for name in read_list(list_file)]
     texts = [COLUMNS] + [[str(value) for value in cells.values()] for cells in rows]
     widths = [max(map(len, column)) for column in zip(*texts)]
     for text in texts:
-        cells = [cell.rjust(width) if 2 <= i <= 4 else cell.ljust(width)
-                 for i, (cell, width) in enumerate(zip(text, widths))]
+        cells = [cell.rjust(width) if column in NUMBERS else cell.ljust(width)
+                 for column, cell, width in zip(COLUMNS, text, widths)]
         print("  ".join(cells).rstrip())
+    write(out / "index.html", page(out, rows))
     return 0 if all(cells["status"] == "mapped" for cells in rows) else 1
 
 

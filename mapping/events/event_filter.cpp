@@ -72,6 +72,11 @@ bool HotPixelFilter::isBusiest(const Event& event) {
   return true;
 }
 
+std::int64_t EventFilterOptions::memoryNs() const {
+  const double counted_s = hot_pixels ? 2 * hot_pixel.period_s : 0;
+  return durationFromSeconds(counted_s + background_activity_s);
+}
+
 EventFilter::EventFilter(int width, int height, const EventFilterOptions& options) {
   options.validate();
   if (options.hot_pixels) hot_pixels_.emplace(width, height, options.hot_pixel);

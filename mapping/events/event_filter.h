@@ -122,6 +122,8 @@ struct EventFilterOptions {
   double background_activity_s = 0;
 
   bool any() const { return hot_pixels || background_activity_s > 0; }
+  /// Returns the time before an event on whose events it depends whether the event is removed.
+  std::int64_t memoryNs() const;
   template <typename Self, typename Visit>
   static void fields(Self& self, Visit&& visit) {
     visit("hot_pixels", self.hot_pixels);

@@ -28,6 +28,13 @@ double depthGuess(const DepthPlanesOptions& planes) {
 
 }  // namespace
 
+TimeLimits FusionMapperOptions::interval() const {
+  if (only_window) return {only_window->t0_ns, only_window->t1_ns};
+  if (planned_windows.empty()) return limits;
+  const std::int64_t t0_ns = planned_windows.front().t0_ns - filter.memoryNs();
+  return {std::max(t0_ns, limits.t0_ns.value_or(kMinTimeNs)), planned_windows.back().t1_ns};
+}
+
 void FusionMapperOptions::validate() const {
   trajectory.validate();
   policy.validate();
@@ -48,9 +55,10 @@ void FusionMapperOptions::validate() const {
 FusionMapper::FusionMapper(const FusionMapperOptions& options)
     : options_(options), trajectory_(options.trajectory) {
   options_.validate();
-  policy_ = options_.only_window
-                ? makeSingleWindowPolicy(*options_.only_window)
-                : makeKeyframePolicy(options_.policy, depthGuess(options_.keyframe.planes));
+  std::vector<Window> given = options_.givenWindows();
+  if (!given.empty()) given_ns_ = given.front().t0_ns;
+  policy_ = given_ns_ ? makeGivenWindowsPolicy(std::move(given))
+                      : makeKeyframePolicy(options_.policy, depthGuess(options_.keyframe.planes));
 }
 
 int FusionMapper::addCamera(const RigCamera& camera) {
@@ -208,7 +216,7 @@ void FusionMapper::configure(const KeyframePolicyOptions& policy,
                              const DepthPlanesOptions& planes) {
   options_.policy = policy;
   setPlanes(planes);
-  if (options_.only_window) return;
+  if (given_ns_) return;
   policy_ = makeKeyframePolicy(policy, depthGuess(planes));
   if (!start_ns_ || released_ns_ <= *start_ns_) return;
   const std::uint64_t dropped = policy_->dropWindowsBefore(*this, released_ns_);
@@ -267,7 +275,7 @@ void FusionMapper::filterEvents() {
 
 /// Finds the start of the recording: the first event with a pose. Releases earlier events.
 void FusionMapper::findStart() {
-  if (options_.only_window) start_ns_ = options_.only_window->t0_ns;
+  if (given_ns_) start_ns_ = given_ns_;
   if (start_ns_ || trajectory_.empty()) return;
   std::int64_t first_ns = kMaxTimeNs;
   for (CameraStream& camera : cameras_) {
@@ -293,10 +301,10 @@ void FusionMapper::skipEmptyWindows() {
   counts_.windows_without_events += policy_->advancePast(*this, empty_until_ns);
 }
 
-/// Returns whether a window is complete: all of its events and poses are here. `only_window` is
+/// Returns whether a window is complete: all of its events and poses are here. Given windows are
 /// complete after `finish` in any case.
 bool FusionMapper::isComplete(const Window& window) const {
-  if (options_.only_window) {
+  if (given_ns_) {
     if (finished_) return true;
     if (reachedNs() < window.t1_ns) return false;
   }
@@ -307,11 +315,23 @@ bool FusionMapper::isComplete(const Window& window) const {
 std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
                                                         StageTimes* times) {
   const std::vector<EventSpan> events = eventsOf(window);
-  if (std::all_of(events.begin(), events.end(), [](EventSpan span) { return span.empty(); })) {
+  const auto count = [](std::uint64_t sum, EventSpan span) { return sum + span.size(); };
+  const std::uint64_t num_events =
+      std::accumulate(events.begin(), events.end(), std::uint64_t{0}, count);
+  if (num_events == 0 && options_.planned_windows.empty()) {
     ++counts_.windows_without_events;
     return std::nullopt;
   }
-  if (keyframeMapper().leavesOut(window, trajectory_)) return std::nullopt;
+  const auto mark_used = [&] {
+    for (CameraStream& camera : cameras_) {
+      camera.markUsed(window, trajectory_, options_.keyframe.max_events_per_camera);
+    }
+  };
+  if (options_.on_planned && trajectory_.poseAt(window.t_ref_ns)) {
+    mark_used();
+    options_.on_planned(window, num_events);
+    return std::nullopt;
+  }
   auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, times);
   if (!keyframe) {
     ++counts_.keyframes_without_pose;
@@ -328,9 +348,7 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
   counts_.motion += motion;
   counts_.event_uses =
       std::accumulate(keyframe->events.begin(), keyframe->events.end(), counts_.event_uses);
-  for (CameraStream& camera : cameras_) {
-    camera.markUsed(window, trajectory_, options_.keyframe.max_events_per_camera);
-  }
+  mark_used();
   return keyframe;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -27,6 +28,12 @@ struct FusionMapperOptions {
   KeyframePolicyOptions policy;
   /// If given, this window is the only keyframe, and `policy` is not used.
   std::optional<Window> only_window;
+  /// If not empty, these windows are the keyframes, and `policy` is not used: an earlier pass over
+  /// the same data found them. They are in the order of `t0_ns`.
+  std::vector<Window> planned_windows;
+  /// If given, no window is mapped: this receives each one that would be, and the number of events
+  /// in it. Then the counts have what a mapping counts of the events.
+  std::function<void(const Window&, std::uint64_t events)> on_planned;
   /// If the last window of the recording is not full, it is moved back so that it ends right after
   /// the last event with a pose. Then it overlaps the window before it. It is skipped if it adds
   /// less than a tenth of what other windows add.
@@ -38,9 +45,12 @@ struct FusionMapperOptions {
   /// As long as fewer events are held, a silent camera delays the others: it may deliver later.
   std::size_t max_waiting_events = 0;
 
-  /// Returns the time interval of the events that are used.
-  TimeLimits interval() const {
-    return only_window ? TimeLimits{only_window->t0_ns, only_window->t1_ns} : limits;
+  /// Returns the time interval of the events that are used, also those that tell which ones the
+  /// filters remove.
+  TimeLimits interval() const;
+  /// Returns `only_window`, or `planned_windows`.
+  std::vector<Window> givenWindows() const {
+    return only_window ? std::vector<Window>{*only_window} : planned_windows;
   }
   void validate() const;
 };
@@ -177,8 +187,9 @@ class FusionMapper : private RecordingProgress {
   std::int64_t silent_ns_ = kMinTimeNs;     // no camera delays the others before this time
   std::int64_t released_ns_ = kMinTimeNs;   // earlier events are counted and released
   bool finished_ = false;
-  std::optional<Window> failed_;  // `next` began to map it and threw
-  MapperCounts counts_;           // without the counts of the cameras
+  std::optional<std::int64_t> given_ns_;  // begin of the given windows, if there are such
+  std::optional<Window> failed_;          // `next` began to map it and threw
+  MapperCounts counts_;                   // without the counts of the cameras
 };
 
 }  // namespace efm

@@ -182,14 +182,6 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   return keyframe;
 }
 
-bool KeyframeMapper::leavesOut(const Window& window, const Trajectory& trajectory) {
-  if (!options_.only_keyframes || options_.only_keyframes->contains(keyframes_)) return false;
-  if (!trajectory.poseAt(window.t_ref_ns)) return false;
-  ++keyframes_;
-  if (options_.on_left_out) options_.on_left_out(window);
-  return true;
-}
-
 std::vector<CameraEvents> KeyframeMapper::selectedEvents(
     const std::vector<EventSpan>& events) const {
   std::vector<CameraEvents> cameras;

@@ -36,14 +36,6 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
                   const Trajectory& trajectory, const EventGroups& groups,
                   const PosePacketsOptions& packets);
 
-/// Keyframes by their numbers: [begin, end).
-struct KeyframeRange {
-  std::uint64_t begin = 0;
-  std::uint64_t end = 0;
-
-  bool contains(std::uint64_t number) const { return number >= begin && number < end; }
-};
-
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;
   /// The camera of the reference view; it need not be a selected camera.
@@ -66,10 +58,6 @@ struct KeyframeMapperOptions {
   /// Returns the keyframe that an earlier run made of the same data in a window; its pose is the
   /// tracker's. std::nullopt: none, the window is mapped. May be empty.
   std::function<std::optional<KeyframeDepthMap>(const Window&)> made_earlier;
-  /// The others are counted, not made. std::nullopt: all are made.
-  std::optional<KeyframeRange> only_keyframes;
-  /// Receives the window of each keyframe that is not made. May be empty.
-  std::function<void(const Window&)> on_left_out;
   bool camera_maps = false;   ///< True: also a depth map of each camera alone, in the same view.
   bool event_images = false;  ///< True: also each camera's events as an image.
   bool view_events = false;   ///< True: also the reference camera's events in the view.
@@ -95,10 +83,6 @@ class KeyframeMapper {
   std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageTimes* times = nullptr);
-
-  /// Returns whether the keyframe of a window is not one of `only_keyframes`. Then it counts as
-  /// made.
-  bool leavesOut(const Window& window, const Trajectory& trajectory);
 
   /// Sets the depth planes of the next keyframes.
   void setPlanes(const DepthPlanesOptions& planes);

@@ -263,34 +263,41 @@ class BaselinePolicy : public KeyframePolicy {
   std::int64_t counted_until_ns_ = kMinTimeNs;  // by the dropped windows
 };
 
-class SingleWindowPolicy : public KeyframePolicy {
+class GivenWindowsPolicy : public KeyframePolicy {
  public:
-  explicit SingleWindowPolicy(const Window& window) : window_(window) {}
+  explicit GivenWindowsPolicy(std::vector<Window> windows) : windows_(std::move(windows)) {}
 
-  std::optional<Window> current(const RecordingProgress&) override { return window_; }
+  std::optional<Window> current(const RecordingProgress&) override {
+    return hasNext() ? std::optional(windows_[next_]) : std::nullopt;
+  }
   std::optional<Window> last(const RecordingProgress&, std::int64_t) const override {
     return std::nullopt;
   }
   std::int64_t earliestStart(const RecordingProgress&) const override {
-    return window_ ? window_->t0_ns : kMaxTimeNs;
+    return hasNext() ? windows_[next_].t0_ns : kMaxTimeNs;
   }
   std::int64_t earliestReference(const RecordingProgress&) const override {
-    return window_ ? std::min(window_->t0_ns, window_->t_ref_ns) : kMaxTimeNs;
+    return hasNext() ? std::min(windows_[next_].t0_ns, windows_[next_].t_ref_ns) : kMaxTimeNs;
   }
-  void advance(const Window&, const KeyframeDepthMap*) override { window_.reset(); }
+  void advance(const Window&, const KeyframeDepthMap*) override { ++next_; }
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t t_ns) override {
-    if (!window_ || window_->t1_ns > t_ns) return 0;
-    window_.reset();
-    return 1;
+    return skipWhile([&](const Window& window) { return window.t1_ns <= t_ns; });
   }
   std::uint64_t dropWindowsBefore(const RecordingProgress&, std::int64_t t_ns) override {
-    if (!window_ || window_->t0_ns >= t_ns) return 0;
-    window_.reset();
-    return 1;
+    return skipWhile([&](const Window& window) { return window.t0_ns < t_ns; });
   }
 
  private:
-  std::optional<Window> window_;
+  bool hasNext() const { return next_ < windows_.size(); }
+  template <typename Condition>
+  std::uint64_t skipWhile(const Condition& condition) {
+    const std::size_t before = next_;
+    while (hasNext() && condition(windows_[next_])) ++next_;
+    return next_ - before;
+  }
+
+  std::vector<Window> windows_;
+  std::size_t next_ = 0;
 };
 
 }  // namespace
@@ -320,8 +327,8 @@ std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& 
   return nullptr;
 }
 
-std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window) {
-  return std::make_unique<SingleWindowPolicy>(window);
+std::unique_ptr<KeyframePolicy> makeGivenWindowsPolicy(std::vector<Window> windows) {
+  return std::make_unique<GivenWindowsPolicy>(std::move(windows));
 }
 
 }  // namespace efm

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/option.h"
@@ -138,7 +139,8 @@ class KeyframePolicy {
 /// @param depth_guess_m assumed mean depth of the scene before the first keyframe.
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,
                                                    double depth_guess_m);
-/// Makes a policy of this window alone, whether the recording fills it or not.
-std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window);
+/// Makes a policy of these windows alone, whether the recording fills them or not.
+/// @param windows in the order of `t0_ns`.
+std::unique_ptr<KeyframePolicy> makeGivenWindowsPolicy(std::vector<Window> windows);
 
 }  // namespace efm

@@ -41,17 +41,25 @@ void BlurWatch::add(std::optional<double> blur_px, double finest_px) {
 }
 
 MotionCorrection knotsOf(const Window& window, double spacing_s) {
-  const auto spacings = [&](std::int64_t from_ns, std::int64_t to_ns) {
-    constexpr double kRounding = 1e-6;
-    const double count = std::ceil(secondsBetween(from_ns, to_ns) / spacing_s - kRounding);
-    return static_cast<std::size_t>(std::max(0.0, count));
-  };
+  constexpr double kRounding = 1e-6;
+  const double before_s = std::max(0.0, secondsBetween(window.t0_ns, window.t_ref_ns));
+  const double after_s = std::max(0.0, secondsBetween(window.t_ref_ns, window.t1_ns));
+  const double longer_s = std::max(before_s, after_s);
   MotionCorrection knots;
-  knots.spacing_s = spacing_s;
-  knots.reference = spacings(window.t0_ns, window.t_ref_ns);
-  knots.knots.assign(knots.reference + spacings(window.t_ref_ns, window.t1_ns) + 1,
-                     Vector6d::Zero());
+  knots.spacing_s = longer_s / std::max(1.0, std::ceil(longer_s / spacing_s - kRounding));
+  const auto spacings = [&](double length_s) {
+    return static_cast<std::size_t>(std::floor(length_s / knots.spacing_s + kRounding));
+  };
+  knots.reference = spacings(before_s);
+  knots.knots.assign(knots.reference + spacings(after_s) + 1, Vector6d::Zero());
   return knots;
+}
+
+std::int64_t timeOfKnot(const MotionCorrection& correction, std::size_t knot,
+                        const Window& window) {
+  const std::int64_t t_ns = window.t_ref_ns + durationFromSeconds(correction.sinceReference(knot));
+  return std::clamp(t_ns, std::min(window.t0_ns, window.t_ref_ns),
+                    std::max(window.t1_ns, window.t_ref_ns));
 }
 
 Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& window,
@@ -65,10 +73,10 @@ Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& windo
   // Between two moved poses, interpolation would miss the knots.
   corrected.add({window.t_ref_ns, trajectory.poseAt(window.t_ref_ns).value()});
   for (std::size_t i = 0; i < correction.knots.size(); ++i) {
-    const double since_s = correction.sinceReference(i);
-    const std::int64_t t_ns = window.t_ref_ns + durationFromSeconds(since_s);
+    const std::int64_t t_ns = timeOfKnot(correction, i, window);
     const std::optional<Rigid3> T_world_rig = trajectory.poseAt(t_ns);
-    if (T_world_rig) corrected.add({t_ns, *T_world_rig * correction.displacement(since_s)});
+    if (!T_world_rig) continue;
+    corrected.add({t_ns, *T_world_rig * correction.displacement(correction.sinceReference(i))});
   }
   return corrected;
 }

@@ -60,9 +60,12 @@ struct MotionCorrectionOptions {
   void validate() const { requireFields(*this); }
 };
 
-/// Returns the knots of a window's correction, all 0: one at the reference time, and others
-/// `spacing_s` apart up to the ends of the window or just beyond.
+/// Returns the knots of a window's correction, all 0: one at the reference time, and others at most
+/// `spacing_s` apart. The outermost one lies at the end that is farther from the reference time,
+/// none lies beyond: poses outside the window may not be here yet, or no more.
 MotionCorrection knotsOf(const Window& window, double spacing_s);
+/// Returns the time of a knot, inside the window or at its end.
+std::int64_t timeOfKnot(const MotionCorrection& correction, std::size_t knot, const Window& window);
 
 /// Returns the corrected motion during a window. In [t0, t1) it has poses at the times of
 /// `trajectory`, and at the knots.

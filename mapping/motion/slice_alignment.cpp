@@ -154,9 +154,7 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
     }
   }
   const Rigid3 T_ref_world = input.T_world_ref.inverse();
-  const auto timeOf = [&](std::size_t slice) {
-    return input.window.t_ref_ns + durationFromSeconds(none_.sinceReference(slice));
-  };
+  const auto timeOf = [&](std::size_t slice) { return timeOfKnot(none_, slice, input.window); };
   for (std::size_t slice = 0; slice < count; ++slice) {
     const std::optional<Rigid3> T_world_rig = tracked.poseAt(timeOf(slice));
     has_pose_.push_back(T_world_rig.has_value());
@@ -178,13 +176,13 @@ SliceAlignment::SliceAlignment(const WindowInput& input, const Trajectory& track
 /// Returns the mean speed of the rig, over tenths of a second: noise of single poses is no speed.
 double SliceAlignment::speed() const {
   constexpr double kOverS = 0.1;
-  const auto over = static_cast<std::size_t>(std::max(1.0, kOverS / effort_.spacing_s));
+  const auto over = static_cast<std::size_t>(std::max(1.0, kOverS / none_.spacing_s));
   double path_m = 0;
   double duration_s = 0;
   for (std::size_t slice = over; slice < has_pose_.size(); slice += over) {
     if (!has_pose_[slice] || !has_pose_[slice - over]) continue;
     path_m += (T_ref_tracked_[slice].translation - T_ref_tracked_[slice - over].translation).norm();
-    duration_s += static_cast<double>(over) * effort_.spacing_s;
+    duration_s += static_cast<double>(over) * none_.spacing_s;
   }
   return duration_s > 0 ? path_m / duration_s : 0;
 }
@@ -363,10 +361,10 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
   for (const Eigen::Vector3d& point : points.p_ref) inverse_depth += 1 / point.z();
   inverse_depth /= static_cast<double>(points.p_ref.size());
   const double sigma_m =
-      effort_.spacing_s * std::max(options_.motion_sigma_m_s, kVelocityError * speed_m_s_);
+      none_.spacing_s * std::max(options_.motion_sigma_m_s, kVelocityError * speed_m_s_);
   // Errors of position and rotation together keep the image aligned.
   const double sigma_rad = std::max(
-      effort_.spacing_s * kRadiansPerDegree * options_.motion_sigma_deg_s, sigma_m * inverse_depth);
+      none_.spacing_s * kRadiansPerDegree * options_.motion_sigma_deg_s, sigma_m * inverse_depth);
   Vector6d sigmas;
   sigmas << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
 
@@ -397,8 +395,8 @@ std::optional<AlignedMotion> SliceAlignment::align(const cv::Mat1f& depth,
   // All poses move together, so that the pose at the reference time stays.
   const Rigid3 back = T_ref_tracked_[none_.reference] * poseAt(none_.reference).inverse();
   AlignedMotion found{none_, 0, std::ldexp(1.0, finest_)};
-  found.correction.walk_m = sigma_m / std::sqrt(effort_.spacing_s);
-  found.correction.walk_rad = sigma_rad / std::sqrt(effort_.spacing_s);
+  found.correction.walk_m = sigma_m / std::sqrt(none_.spacing_s);
+  found.correction.walk_rad = sigma_rad / std::sqrt(none_.spacing_s);
   for (std::size_t slice = 0; slice < count; ++slice) {
     if (!has_pose_[slice] || slice == none_.reference) continue;
     found.correction.knots[slice] =

@@ -101,14 +101,16 @@ struct MappingArguments {
 };
 
 struct MapArguments : MappingArguments {
-  bool view = false;                    ///< Show the growing map in a window.
-  std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
-  bool resume = false;                  ///< Go on with the keyframes of an earlier run.
-  std::filesystem::path plan;           ///< Of `plan`: make one of its shards.
-  std::optional<std::size_t> shard;     ///< Its number, from 0.
-  nlohmann::ordered_json planned;       ///< See MapJob, as the next two.
+  bool view = false;                          ///< Show the growing map in a window.
+  std::filesystem::path record_frames;        ///< Folder for a picture per keyframe; empty: none.
+  bool resume = false;                        ///< Go on with the keyframes of an earlier run.
+  std::filesystem::path plan;                 ///< Of `plan`: make one of its shards.
+  std::optional<std::size_t> shard;           ///< Its number, from 0.
+  std::shared_ptr<const PlannedMap> planned;  ///< See MapJob, as the next two.
   std::optional<KeyframeRange> keyframes;
   std::vector<std::shared_ptr<const SessionFile>> by_shards;
+  std::function<void(const char* activity, double fraction)> on_progress;
+  std::function<void(const std::string& text)> on_error;
 };
 
 struct PlanArguments {

@@ -96,6 +96,7 @@ struct CommandLineJob {
   const OptionReader reader;
   const Interruption interruption{};
   MapJob job;
+  std::function<void(const std::string&)> on_error;  ///< Receives the error; may be empty.
 
   /// Runs the job, and prints the summary and the error. @return the exit status.
   int run();
@@ -116,11 +117,11 @@ int CommandLineJob::run() {
     std::cout << summaryOf(report, kind, job.out);
   }
   if (const auto& error = result.error) {
+    if (on_error) on_error(error->text);
     const auto wrong = error->wrong ? reader.wrongOption(*error->wrong) : std::nullopt;
     if (wrong) return fail(*wrong + error->more, kUsageStatus);
-    return fail(
-        error->text + reader.origins(error->options),
-        !job.planned.is_null() && isTemporary(error->text) ? kTryAgainStatus : kFailedStatus);
+    return fail(error->text + reader.origins(error->options),
+                job.plan && isTemporary(error->text) ? kTryAgainStatus : kFailedStatus);
   }
   if (report.stopped_at) {
     std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
@@ -128,7 +129,7 @@ int CommandLineJob::run() {
     return kInterruptedStatus;
   }
   const bool strict = arguments.strict && failStrictly(report.warnings);
-  if (result.isWithoutPoints() && job.planned.is_null()) {
+  if (result.isWithoutPoints() && !job.plan) {
     return fail("the map has no point; its files are written");
   }
   return strict ? kFailedStatus : 0;
@@ -201,7 +202,7 @@ int runMap(const MapArguments& arguments) {
   MapCommand command(arguments);
   MapJob& job = command.job;
   job.resume = arguments.resume;
-  job.planned = arguments.planned;
+  job.plan = arguments.planned;
   job.shard = arguments.keyframes;
   job.by_shards = arguments.by_shards;
   for (const auto& session : job.by_shards) job.inputs.push_back(session->path());
@@ -210,6 +211,8 @@ int runMap(const MapArguments& arguments) {
     watchers.add(run, keyframe);
   };
   job.on_last_keyframe = [&](const RecordingKeyframes& run) { watchers.show(run, true); };
+  job.on_progress = arguments.on_progress;
+  command.on_error = arguments.on_error;
   const int status = command.run();
   watchers.wait(command.interruption);
   return status;
@@ -217,16 +220,13 @@ int runMap(const MapArguments& arguments) {
 
 PlannedMap planMapOf(const MapArguments& arguments) {
   MapCommand command(arguments);
-  const auto require = [&](const OptionError& error) {
-    if (const auto wrong = command.reader.wrongOption(error)) throw UsageError(*wrong);
-  };
   try {
-    PlannedMap planned = asUsage([&] { return planMap(command.job); });
-    if (planned.error && planned.error->wrong) require(*planned.error->wrong);
-    return planned;
+    return planMap(command.job);
   } catch (const OptionError& error) {
-    require(error);
+    if (const auto wrong = command.reader.wrongOption(error)) throw UsageError(*wrong);
     throw;
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
   }
 }
 

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <stdexcept>
 
@@ -15,6 +20,7 @@
 #include "plugin/app/program.h"
 #include "plugin/playback/session_map.h"
 #include "plugin/playback/stored_run.h"
+#include "plugin/results/output/result_folder.h"
 
 namespace efm {
 namespace {
@@ -22,18 +28,18 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr int kPlanVersion = 1;
+constexpr int kPlanVersion = 2;
 
 /// The content of plan.json.
 struct Plan {
   fs::path file;
   fs::path folder;                 ///< In which the words hold.
   std::vector<std::string> words;  ///< The arguments of `map`.
-  Json run;
+  std::shared_ptr<PlannedMap> map;
   std::vector<KeyframeRange> shards;
 
   static Plan read(const fs::path& file);
-  void write(const std::vector<Window>& keyframes) const;
+  void write() const;
   /// Returns the arguments of `map`, in the folder of the plan, for a result.
   MapArguments argumentsFor(const fs::path& out, Verbosity verbosity) const;
 };
@@ -45,11 +51,19 @@ Plan Plan::read(const fs::path& file) {
     if (version != kPlanVersion) {
       throw std::runtime_error(fmt::format("version {}: expected {}", version, kPlanVersion));
     }
-    Plan plan{file, json.at("folder").get<std::string>(), json.at("arguments"), json.at("run"), {}};
+    Plan plan{file,
+              json.at("folder").get<std::string>(),
+              json.at("arguments"),
+              std::make_shared<PlannedMap>(PlannedMap::of(json)),
+              {}};
+    std::uint64_t begin = 0;
     for (const Json& shard : json.at("shards")) {
-      plan.shards.push_back(
-          {shard.at("begin").get<std::uint64_t>(), shard.at("end").get<std::uint64_t>()});
+      plan.shards.push_back({shard.at("begin"), shard.at("end")});
+      if (plan.shards.back().begin != begin || plan.shards.back().end < begin) break;
+      begin = plan.shards.back().end;
     }
+    if (begin != plan.map->keyframes.size())
+      throw std::runtime_error("expected shards that divide all its keyframes");
     return plan;
   } catch (const Json::exception&) {
     throw std::runtime_error(file.string() + ": no plan: expected a file of `event-fusion plan`");
@@ -58,18 +72,23 @@ Plan Plan::read(const fs::path& file) {
   }
 }
 
-void Plan::write(const std::vector<Window>& keyframes) const {
-  Json json = {{"plan", kPlanVersion},          {"folder", folder.string()}, {"arguments", words},
-               {"keyframes", keyframes.size()}, {"shards", Json::array()},   {"run", run}};
+void Plan::write() const {
+  const std::vector<PlannedMap::Keyframe>& keyframes = map->keyframes;
+  Json json = {{"plan", kPlanVersion},
+               {"folder", folder.string()},
+               {"arguments", words},
+               {"keyframes", keyframes.size()},
+               {"shards", Json::array()}};
   for (const KeyframeRange& shard : shards) {
     Json one = {{"begin", shard.begin}, {"end", shard.end}};
     if (shard.begin < shard.end) {
-      one["t0"] = formatSeconds(keyframes[shard.begin].t0_ns);
-      one["t1"] = formatSeconds(keyframes[shard.end - 1].t1_ns);
+      one["t0"] = formatSeconds(keyframes[shard.begin].window.t0_ns);
+      one["t1"] = formatSeconds(keyframes[shard.end - 1].window.t1_ns);
     }
     json["shards"].push_back(std::move(one));
   }
-  writeAtomically(file, byStream([&](std::ostream& stream) { stream << json.dump(1) << '\n'; }));
+  map->addTo(json);
+  writeAtomically(file, byStream([&](std::ostream& stream) { stream << json << '\n'; }));
 }
 
 MapArguments Plan::argumentsFor(const fs::path& out, Verbosity verbosity) const {
@@ -82,7 +101,7 @@ MapArguments Plan::argumentsFor(const fs::path& out, Verbosity verbosity) const 
   }
   MapArguments arguments = mapArgumentsOf(words);
   arguments.out = absolute;
-  arguments.planned = run;
+  arguments.planned = map;
   if (verbosity != Verbosity::kNormal) arguments.verbosity = verbosity;
   return arguments;
 }
@@ -109,19 +128,100 @@ std::size_t shardNumber(const std::optional<std::size_t>& given, std::size_t cou
   throw UsageError(fmt::format("{}: shard {}: expected 0 to {}", name, *number, count - 1));
 }
 
+/// The file status.json in the folder of a shard or a join: what the process is doing.
+class StatusFile {
+ public:
+  /// A folder that is not for this result, or that another process works for, has no file of this
+  /// one: the error says why.
+  StatusFile(const fs::path& out, bool force) {
+    try {
+      ResultFolder::require(out, OutputKind::kMap, force);
+      fs::create_directories(out);
+      file_ = fs::absolute(out) / "status.json";
+    } catch (const std::exception&) {
+    }
+    json_ = {{"state", "running"}, {"activity", "start"}, {"progress", 0.0}, {"reason", ""}};
+    json_["host"] = hostName();
+    json_["process"] = ::getpid();
+    json_["begin"] = json_["time"] = now();
+    write();
+  }
+
+  /// Returns why the process for a folder did not end; empty if it is not known.
+  static std::string reasonIn(const fs::path& folder) {
+    std::ifstream file(folder / "status.json");
+    const Json status = Json::parse(file, nullptr, false);
+    return status.is_object() ? status.value("reason", "") : "";
+  }
+
+  void show(const char* activity, double progress) {
+    json_["activity"] = activity;
+    json_["progress"] = std::round(1000 * progress) / 1000;
+    if (std::chrono::steady_clock::now() - written_ > std::chrono::seconds(1)) write();
+  }
+  /// @param reason of a failure.
+  void end(int status, const std::string& reason) {
+    json_["state"] = status == 0 ? "done" : status == kTryAgainStatus ? "try again" : "failed";
+    json_["exit_status"] = status;
+    json_["reason"] = reason;
+    if (status == 0) json_["progress"] = 1.0;
+    write();
+  }
+
+ private:
+  static std::string now() {
+    const std::time_t time = std::time(nullptr);
+    return fmt::format("{:%FT%TZ}", fmt::gmtime(time));
+  }
+  void write() {
+    written_ = std::chrono::steady_clock::now();
+    json_["time"] = now();
+    if (file_.empty()) return;
+    try {
+      writeAtomically(file_, byStream([&](std::ostream& stream) {
+                        stream << json_.dump(1, ' ', false, Json::error_handler_t::replace) << '\n';
+                      }));
+    } catch (const std::exception&) {  // no room: the shard says so
+    }
+  }
+
+  fs::path file_;
+  Json json_;
+  std::chrono::steady_clock::time_point written_;
+};
+
 /// Runs `map` for a shard or a join. @return 75 if the next try may succeed.
-int runPlanned(const MapArguments& arguments) {
+int runPlanned(MapArguments arguments) {
+  StatusFile status(arguments.out, arguments.force);
+  std::string reason;
+  arguments.on_progress = [&](const char* activity, double fraction) {
+    status.show(activity, fraction);
+  };
+  arguments.on_error = [&](const std::string& text) { reason = text; };
+  const auto failed = [&](const std::string& text, bool is_temporary) {
+    reason = text;
+    return fail(text, is_temporary ? kTryAgainStatus : kFailedStatus);
+  };
+  int result = 0;
   try {
-    const int status = runMap(arguments);
-    return status == kInterruptedStatus ? kTryAgainStatus : status;
-  } catch (const UsageError&) {
+    result = runMap(arguments);
+    if (result == kInterruptedStatus) {
+      reason = "stopped by a signal";
+      result = kTryAgainStatus;
+    }
+  } catch (const UsageError& error) {
+    status.end(kUsageStatus, error.what());
+    throw;
+  } catch (const PartDiffers&) {
     throw;
   } catch (const Interrupted& interrupted) {
-    return fail(interrupted.what(), kTryAgainStatus);
+    result = failed(interrupted.what(), true);
   } catch (const std::exception& error) {
     const std::string text = userMessage(error);
-    return fail(text, isTemporary(text) ? kTryAgainStatus : kFailedStatus);
+    result = failed(text, isTemporary(text));
   }
+  status.end(result, reason);
+  return result;
 }
 
 }  // namespace
@@ -140,9 +240,9 @@ int runPlan(const PlanArguments& arguments) {
   if (of_map.resume || of_map.view || !of_map.record_frames.empty()) {
     throw UsageError("--resume, --view, --record-frames: are for one run, not for a plan");
   }
-  const PlannedMap planned = planMapOf(of_map);
-  Plan plan{arguments.out, fs::current_path(), arguments.words, planned.run, {}};
-  const std::uint64_t keyframes = planned.keyframes.size();
+  Plan plan{arguments.out, fs::current_path(), arguments.words, {}, {}};
+  plan.map = std::make_shared<PlannedMap>(planMapOf(of_map));
+  const std::uint64_t keyframes = plan.map->keyframes.size();
   const std::uint64_t block = KeyframeMapper::kBlockKeyframes;
   const std::uint64_t blocks = (keyframes + block - 1) / block;
   for (std::size_t k = 0; k < arguments.shards; ++k) {
@@ -154,13 +254,24 @@ int runPlan(const PlanArguments& arguments) {
     };
     plan.shards.push_back({begin_of(k), begin_of(k + 1)});
   }
-  plan.write(planned.keyframes);
-  if (planned.error) return fail(planned.error->text);
+  plan.write();
+  if (!plan.map->pass.error.empty()) return fail(plan.map->pass.error);
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   const auto empty = std::count_if(plan.shards.begin(), plan.shards.end(),
                                    [](const KeyframeRange& s) { return s.begin == s.end; });
   fmt::print("{} keyframes in {} shards; written to {}\n", keyframes, plan.shards.size(),
              arguments.out.string());
+  const auto [read_s, reach_s] = std::pair(plan.map->read_s, plan.map->reach_s);
+  if (!plan.map->from_begin.empty() || reach_s > std::max(1.0, 0.2 * read_s)) {
+    fmt::print("each shard reads the recording from its begin: up to {:.3g} s each{}{}\n",
+               std::max(read_s, reach_s), plan.map->from_begin.empty() ? "" : ": ",
+               plan.map->from_begin);
+  } else {
+    fmt::print(
+        "a shard reads its part: the last keyframe's events are reached in {:.2g} s, all "
+        "take {:.3g} s\n",
+        reach_s, read_s);
+  }
   if (empty > 0) {
     fmt::print("empty: the last {} of them: there are {} blocks of {} keyframes\n", empty, blocks,
                block);
@@ -174,6 +285,7 @@ int runShard(const MapArguments& arguments) {
   if (arguments.out.empty()) throw UsageError("--out: expected the folder of the shard");
   const KeyframeRange keyframes = plan.shards[number];
   if (keyframes.begin == keyframes.end) {
+    StatusFile(arguments.out, arguments.force).end(0, "");
     if (arguments.verbosity != Verbosity::kQuiet) fmt::print("shard {} has no keyframe\n", number);
     return 0;
   }
@@ -182,7 +294,18 @@ int runShard(const MapArguments& arguments) {
   of_shard.resume = true;
   of_shard.strict = false;
   of_shard.force |= arguments.force;
-  return runPlanned(of_shard);
+  try {
+    return runPlanned(of_shard);
+  } catch (const PartDiffers&) {
+    plan.map->from_begin = "the part was read in another way";
+  }
+  try {
+    return runPlanned(of_shard);  // goes on with the keyframes that are right
+  } catch (const PartDiffers& error) {
+    const std::string text = std::string(error.what()) + ": expected the recording of the plan";
+    StatusFile(of_shard.out, of_shard.force).end(kFailedStatus, text);
+    return fail(text);
+  }
 }
 
 int runJoin(const JoinArguments& arguments) {
@@ -196,12 +319,13 @@ int runJoin(const JoinArguments& arguments) {
   std::vector<std::string> without;
   for (const fs::path& folder : arguments.shards) {
     const auto file = sessionAt(folder);
-    if (!file) {  // of an empty shard
-      without.push_back(folder.string());
+    if (!file) {  // of an empty shard, or of one that did not end
+      const std::string reason = StatusFile::reasonIn(folder);
+      without.push_back(folder.string() + (reason.empty() ? "" : " (" + reason + ")"));
       continue;
     }
     const auto session = std::make_shared<const SessionFile>(fs::absolute(*file));
-    requireSameChoice(plan.run, session->run(), file->string(), "");
+    requireSameChoice(plan.map->run, session->run(), file->string(), "");
     const Json range = session->run().value("shard", Json());
     const auto shard =
         std::find_if(plan.shards.begin(), plan.shards.end(), [&](const KeyframeRange& s) {
@@ -211,10 +335,10 @@ int runJoin(const JoinArguments& arguments) {
       throw std::runtime_error(file->string() + ": no shard of " + plan.file.string());
     }
     const std::size_t count = session->keyframes();
-    if (count != shard->end - shard->begin || session->keyframe(count - 1).after_stop) {
+    if (count != shard->size() || session->keyframe(count - 1).after_stop) {
       throw std::runtime_error(fmt::format(
           "{}: {} of {} keyframes: expected a shard that ended (run it again: it goes on)",
-          file->string(), count, shard->end - shard->begin));
+          file->string(), count, shard->size()));
     }
     auto& place = by_shard[static_cast<std::size_t>(shard - plan.shards.begin())];
     if (place) {

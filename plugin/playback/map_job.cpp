@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -52,7 +52,9 @@ RecordingSource MapJob::sourceNow() const {
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
     perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.stride_s);
   }
-  now.limits = options.mapper.interval();
+  const bool reads_all = plan && !plan->from_begin.empty();
+  now.limits = reads_all ? options.mapper.limits : options.mapper.interval();
+  now.only_poses = !by_shards.empty() && !options.mapper.planned_windows.empty();
   return now;
 }
 
@@ -110,6 +112,10 @@ struct Job : MapJob {
   const std::chrono::steady_clock::time_point began = std::chrono::steady_clock::now();
 };
 
+double secondsSince(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 void requireNoStop(const Job& job) {
   if (job.stop && job.stop()) throw Interrupted();
 }
@@ -144,6 +150,9 @@ void warnOfReplacement(Job& job) {
 
 /// Returns whether the result is there already.
 bool isComplete(const Job& job) { return job.stored && job.stored->is_complete; }
+
+/// Returns the keyframes of a planned map that a job is for.
+KeyframeRange rangeOf(const Job& job) { return job.shard.value_or(job.plan->all()); }
 
 /// The first look at a recording.
 struct Look {
@@ -221,7 +230,8 @@ Look lookAt(Job& job) {
   look.first.quality = std::move(verdict.quality);
   append(look.first.quality.doubts, std::move(doubts));
   const bool changes = job.sourceNow().faults.perturbation.keyframe.any();  // by the chosen stride
-  if (held->isWhole() && !changes) {
+  if (job.plan) options.mapper.planned_windows = job.plan->windowsOf(rangeOf(job));
+  if (held->isWhole() && !changes && !job.plan) {
     look.recording = std::move(held);
   } else {
     held.reset();
@@ -268,13 +278,27 @@ std::string roundingOf(const std::string& kernel) { return kernel == "avx512" ? 
 
 /// Requires that a part of a planned map is of the same recording, options and rounding.
 void requirePlanned(const Job& job) {
-  requireSameChoice(job.planned, job.run, "the plan", "");
-  const std::string planned = job.planned.at("kernel"), now = job.run.at("kernel");
+  requireSameChoice(job.plan->run, job.run, "the plan", "");
+  const std::string planned = job.plan->run.at("kernel"), now = job.run.at("kernel");
   if (roundingOf(planned) == roundingOf(now)) return;
   throw std::runtime_error(fmt::format(
       "the plan is for the kernel {}, this machine has {}, which rounds in another way: expected "
       "machines of one kind, or a plan with --set performance.kernel=sse4 or plain",
       planned, now));
+}
+
+/// Requires that a keyframe has the events of the plan.
+/// @param damage of the recording: events after it are missing.
+void requirePlanned(const PlannedMap& plan, std::uint64_t number, const KeyframeDepthMap& keyframe,
+                    const std::optional<UserError>& damage) {
+  const std::uint64_t unused = keyframe.without_pose + keyframe.outside_lens + keyframe.over_budget;
+  const std::uint64_t events =
+      std::accumulate(keyframe.events.begin(), keyframe.events.end(), unused);
+  if (events == plan.keyframes[number].events) return;
+  if (damage) throw ShardError(damage->text);
+  throw PartDiffers(fmt::format("keyframe {} at {} s has {} events, by the plan {}", number,
+                                formatSeconds(keyframe.window.t_ref_ns), events,
+                                plan.keyframes[number].events));
 }
 
 /// Warns if stored keyframes are of a kernel that rounds in another way.
@@ -346,11 +370,8 @@ Look begin(Job& job, OutputKind kind, std::optional<ResultFolder>& folder) {
   requireNoStop(job);
   if (job.out.empty()) return look;
   if (has_session) addChosen(job.run, look.recording->rig(), job.options, look.first.chosen);
-  if (!job.planned.is_null()) requirePlanned(job);
-  if (job.shard) {
-    keyframe.only_keyframes = job.shard;
-    job.options.refinement.enabled = false;  // it is for all keyframes together
-  }
+  if (job.plan) requirePlanned(job);
+  if (job.shard) job.options.refinement.enabled = false;  // it is for all keyframes together
   std::vector<StoredKeyframes> made;
   if (job.stored) {
     const SessionFile& stored = *job.stored->session;
@@ -399,12 +420,15 @@ class ShardImages {
       ++shard_;
       copied_ = 0;
     }
-    if (shard_ == shards_.size()) {
-      throw std::runtime_error("the recording has more keyframes than the plan: plan it again");
-    }
     const std::filesystem::path from = shards_[shard_]->path().parent_path() / name;
     std::filesystem::create_directories(result / "keyframes");
-    std::filesystem::copy(from, result / name, std::filesystem::copy_options::recursive);
+    using Options = std::filesystem::copy_options;
+    std::error_code error;  // another file system has no second names for these files
+    std::filesystem::copy(from, result / name, Options::recursive | Options::create_hard_links,
+                          error);
+    if (error) {
+      std::filesystem::copy(from, result / name, Options::recursive | Options::overwrite_existing);
+    }
     ++copied_;
   }
 
@@ -445,8 +469,7 @@ void judgePoints(RunReport& report, const MapCloud& points) {
 /// Ends the measured time of the mapping and its files.
 void endTimes(Job& job) {
   StageTimes& times = job.report.times;
-  times.real.total =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - job.began).count();
+  times.real.total = secondsSince(job.began);
   times.cpu.start = job.start_cpu_s;
   times.cpu.images = asideSeconds() - job.start_aside_s;
   times.cpu.total = processSeconds();
@@ -486,6 +509,9 @@ MapResult end(Job& job, std::optional<ResultFolder>& folder, std::shared_ptr<con
   try {
     throw;
   } catch (const Interrupted&) {
+    throw;
+  } catch (const ShardError&) {  // the next try goes on
+    if (folder) folder->abandon();
     throw;
   } catch (const std::runtime_error& error) {
     const std::string stays = folder ? folder->abandon() : std::string();
@@ -608,18 +634,22 @@ MapResult mapInto(MapJob given) {
       sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
       pictures.add(keyframe.map.depth, keyframe.view_events);
     });
-    RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
-                           hostOf(job, "mapping"));
-    const KeyframeRange all{0, std::numeric_limits<std::uint64_t>::max()};
-    const KeyframeRange range = job.shard.value_or(all);
-    for (std::uint64_t number = range.begin; number < range.end; ++number) {
+    RecordingKeyframes::Host host =
+        job.by_shards.empty() ? hostOf(job, "mapping") : interruptible(job, "joining");
+    if (!job.by_shards.empty()) host.known = &job.plan->pass;
+    RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity, host,
+                           job.by_shards.empty() ? "mapping" : "joining");
+    std::uint64_t number = job.shard ? job.shard->begin : 0;
+    while (!job.shard || number < job.shard->end) {
       const auto keyframe = run.next();
       if (!keyframe) break;
+      if (job.plan) requirePlanned(*job.plan, number++, *keyframe, run.error());
       if (writes) writer.add(*keyframe);
       if (job.on_keyframe) job.on_keyframe(*keyframe, run);
     }
     if (job.on_last_keyframe) job.on_last_keyframe(run);
     writer.finish();
+    if (job.shard && number < job.shard->end && run.error()) throw ShardError(run.error()->text);
 
     StageTimes exporting;
     std::shared_ptr<const MapSnapshot> map;
@@ -628,7 +658,6 @@ MapResult mapInto(MapJob given) {
       map = run.map();
     }
     const std::size_t judged = job.report.warnings.size();
-    const std::optional<UserError> of_reading = run.error();
     describe(job, run, look.recording->counts(), *map);
     if (job.shard) job.report.warnings.resize(judged);  // the join judges all keyframes together
     describePoints(*map->points, job.report);
@@ -653,7 +682,7 @@ MapResult mapInto(MapJob given) {
       job.report.session = cost;
     }
     if (has_files) writePage(job, *output, *map, pictures);
-    return end(job, folder, std::move(map), job.shard ? of_reading : run.error());
+    return end(job, folder, std::move(map), job.shard ? std::nullopt : run.error());
   } catch (...) {
     rethrow(folder);
   }
@@ -682,18 +711,30 @@ PlannedMap planMap(MapJob given) {
   plan.run = runOf(job);
   Look look = lookAt(job);
   addChosen(plan.run, look.recording->rig(), job.options, look.first.chosen);
-  job.options.mapper.keyframe.only_keyframes = KeyframeRange();
-  job.options.mapper.keyframe.on_left_out = [&](const Window& window) {
-    plan.keyframes.push_back(window);
+  job.options.mapper.on_planned = [&](const Window& window, std::uint64_t events) {
+    plan.keyframes.push_back({window, events});
   };
+  const auto began = std::chrono::steady_clock::now();
   RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
                          interruptible(job, "planning"), "planning");
   while (run.next()) {
   }
-  plan.error = run.error();
-  if (plan.keyframes.empty() && !plan.error) {
-    plan.error = UserError{"there is no keyframe (map RECORDING says why)"};
+  if (run.error() && run.error()->wrong) throw *run.error()->wrong;
+  plan.pass = run.pass();
+  if (plan.keyframes.empty()) {
+    const std::string why = plan.pass.error.empty() ? "map RECORDING says why" : plan.pass.error;
+    throw std::runtime_error("there is no keyframe: " + why);
   }
+  if (plan.pass.read.skipped_events > 0) plan.from_begin = "bad events are left out";
+  plan.read_s = secondsSince(began);
+  job.plan = std::make_shared<PlannedMap>(plan);
+  job.options.mapper.planned_windows = {plan.keyframes.back().window};
+  const auto opened = std::chrono::steady_clock::now();
+  const std::unique_ptr<Recording> part = openRecording(job.sourceNow());
+  for (auto sample = part->read(); sample && !std::holds_alternative<EventPacket>(*sample);) {
+    sample = part->read();
+  }
+  plan.reach_s = secondsSince(opened);
   return plan;
 }
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "plugin/playback/error_text.h"
+#include "plugin/playback/planned_map.h"
 #include "plugin/playback/progress.h"
 #include "plugin/playback/recording_keyframes.h"
 #include "plugin/recordings/open/open_recording.h"
@@ -31,10 +31,10 @@ struct MapJob {
   bool save_dsi = false;        ///< `mapWindowInto`: write the whole DSI.
   bool resume = false;          ///< `mapInto`: go on with the keyframes of an earlier run.
   bool needs_map = false;       ///< `mapInto`: give the map of a complete result, too.
-  /// `mapInto`: a part of a planned map. `planned` is PlannedMap::run: this job must have the same
-  /// options and recording. Either the keyframes of a shard are made, or all are there, made by
-  /// shards, and the job makes the map of them.
-  nlohmann::ordered_json planned;
+  /// `mapInto`: a part of a planned map; null: none. This job must have the same options and
+  /// recording. Either the keyframes of a shard are made, or all are there, made by shards, and the
+  /// job makes the map of them.
+  std::shared_ptr<const PlannedMap> plan;
   std::optional<KeyframeRange> shard;
   std::vector<std::shared_ptr<const SessionFile>> by_shards;
   /// Further files that are read: the result must not replace them.
@@ -91,15 +91,18 @@ struct MapResult {
 /// written.
 MapResult mapInto(MapJob job);
 
-/// What is known of a map before it is made.
-struct PlannedMap {
-  nlohmann::ordered_json run;      ///< SessionFile::run.
-  std::vector<Window> keyframes;   ///< The window of each.
-  std::optional<UserError> error;  ///< Why the recording was not read to its end.
+/// A shard cannot be made to its end. Its keyframes so far stay.
+class ShardError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
 };
+/// The events of a planned window are not those of the plan: the part was read in another way.
+class PartDiffers : public ShardError {
+  using ShardError::ShardError;
+};
+
 /// Reads a recording to its end, and finds its keyframes without making them.
 /// @throws as `mapInto`; std::invalid_argument naming an option with which keyframes depend on all
-/// those before them.
+/// those before them; std::runtime_error if there is no keyframe.
 PlannedMap planMap(MapJob job);
 
 /// Maps the window `options.mapper.only_window`: all that `event-fusion depth` writes.

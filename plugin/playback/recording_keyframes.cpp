@@ -62,12 +62,17 @@ bool RecordingKeyframes::attempt(const Step& step, bool is_input) {
 }
 
 std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
+  const bool is_planned = !options_.mapper.planned_windows.empty();
+  if (is_planned && host_.on_progress) host_.on_progress(fraction());
+  if (is_planned && progress_.due()) showProgress();
+  if (is_planned && ended_ && host_.stop) host_.stop();  // many come after the last sample
   while (true) {
     std::optional<KeyframeDepthMap> made;
     const bool maps = attempt([&] { made = options_.live.enabled ? takeMade() : mapper_->next(); });
     if (made) {
       made->after_stop = stopped_;
       depths_.add(*made);
+      ++returned_;
       if (verbosity_ == Verbosity::kVerbose) progress_.print(keyframeLine(*made));
       return made;
     }
@@ -75,6 +80,7 @@ std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
     stopped_ = host_.stop && host_.stop();
     ended_ = !maps || stopped_ || !feedNext();
     if (ended_) {
+      if (stopped_ && is_planned) return std::nullopt;  // the next windows lack their events
       attempt([this] { mapper_->finish(); });
       continue;
     }
@@ -146,19 +152,22 @@ WatchedMap RecordingKeyframes::watched(const KeyframeDepthMap& newest, double wa
 void RecordingKeyframes::showProgress() {
   const SessionStatus status = mapper_->status();
   const double seconds = std::max(progress_.seconds(), 1e-3);
-  std::string details =
-      fmt::format("{} keyframes, {:.2g} M events/s", status.counts.keyframes,
-                  1e-6 * static_cast<double>(status.counts.total().read) / seconds);
-  if (status.events) {
+  std::string details = fmt::format("{} keyframes", status.counts.keyframes);
+  if (status.events) {  // a join reads none
     details +=
-        fmt::format(", {:.2g}x real time",
+        fmt::format(", {:.2g} M events/s, {:.2g}x real time",
+                    1e-6 * static_cast<double>(status.counts.total().read) / seconds,
                     secondsBetween(status.events->first_ns, status.events->last_ns) / seconds);
   }
   progress_.show(fraction(), details);
 }
 
-/// Computed from the events' time if its end is known, otherwise from the input.
+/// Computed from the keyframes if they are planned, from the events' time if its end is known,
+/// otherwise from the input.
 double RecordingKeyframes::fraction() const {
+  if (const std::size_t planned = options_.mapper.planned_windows.size(); planned > 0) {
+    return static_cast<double>(returned_) / static_cast<double>(planned);
+  }
   const TimeLimits limits = options_.mapper.interval();
   if (!limits.t1_ns) return recording_.progress();
   const std::optional<TimeSpan> events = mapper_->status().events;
@@ -179,7 +188,7 @@ std::string RecordingKeyframes::keyframeLine(const KeyframeDepthMap& keyframe) {
   return fmt::format(
       "keyframe {} at {}: {} events, {} depths; sweep {:.3f} s, depth {:.3f} s, motion {:.3f} s, "
       "refinement {:.3f} s",
-      ++returned_, timeText(keyframe.window.t_ref_ns, start_ns),
+      returned_, timeText(keyframe.window.t_ref_ns, start_ns),
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), std::uint64_t{0}),
       cv::countNonZero(keyframe.map.depth), now.rays + now.sweep - before.rays - before.sweep,
       now.depth - before.depth, now.motion - before.motion, now.refine - before.refine);
@@ -202,9 +211,18 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, RunReport&
 
 }  // namespace
 
+EventPass RecordingKeyframes::pass() const {
+  const SessionStatus status = mapper_->status();
+  return {status.counts, status.events, recording_.counts(), error_ ? error_->text : ""};
+}
+
 void RecordingKeyframes::describe(RunReport& report) {
   SessionStatus status = mapper_->status();
-  const RecordingCounts read = recording_.counts();
+  RecordingCounts read = recording_.counts();
+  if (host_.known != nullptr) {
+    host_.known->replaceIn(status, read);
+    if (!error_ && !host_.known->error.empty()) error_ = UserError{host_.known->error};
+  }
   const FusionMapperOptions& options = options_.mapper;
   const DepthPlanesOptions& planes = options.keyframe.planes;
   if (error_ && status.events) {

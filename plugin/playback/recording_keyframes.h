@@ -16,6 +16,7 @@
 #include "plugin/engine/map_watcher.h"
 #include "plugin/engine/mapper_driver.h"
 #include "plugin/playback/error_text.h"
+#include "plugin/playback/planned_map.h"
 #include "plugin/playback/progress.h"
 #include "plugin/recordings/streams/sample.h"
 #include "plugin/results/output/report.h"
@@ -42,6 +43,9 @@ class RecordingKeyframes {
     std::function<bool()> stop;
     std::function<void(double fraction)> on_progress;  ///< Called after each sample; may be empty.
     DsiSink* sink = nullptr;                           ///< Receives every fused plane; may be null.
+    /// What a pass over all events counted; may be null. It replaces the counts of this run, which
+    /// reads a part of them.
+    const EventPass* known = nullptr;
   };
 
   /// @param recording must live longer than this object.
@@ -61,6 +65,8 @@ class RecordingKeyframes {
   WatchedMap watched(const KeyframeDepthMap& newest, double watched_s) const;
   double seconds() const { return progress_.seconds(); }
 
+  /// Returns what this run has counted.
+  EventPass pass() const;
   /// Returns the damage of the recording, or why there is no keyframe; std::nullopt without error.
   const std::optional<UserError>& error() const { return error_; }
   /// Adds the results of the run to a report that has the warnings and doubts of the first look.
@@ -90,8 +96,8 @@ class RecordingKeyframes {
   std::deque<KeyframeDepthMap> made_;     // in live operation: not returned yet
   std::optional<std::int64_t> first_ns_;  // in live operation: time of the first sample
   std::chrono::steady_clock::time_point began_;
-  std::uint64_t returned_ = 0;  // keyframes
-  StageSeconds reported_;       // stage times until the last reported keyframe
+  std::size_t returned_ = 0;  // keyframes
+  StageSeconds reported_;     // stage times until the last reported keyframe
   Progress progress_;
   std::shared_ptr<MapperDriver> mapper_;  // last, never null: its thread uses the others
 };

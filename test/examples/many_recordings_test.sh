@@ -39,11 +39,12 @@ expect "error of equal names" "$(cat errors)" "error: same_names:3: the name 'br
 printf '%s\n' '# three recordings' "'one slider'" broken 'killed: other/broken' >list
 map 1 list
 for name in "one slider" killed; do
-    expect "row of $name" "$(row "$name")" "$name mapped 1 [1-9]* [0-9]*.[0-9] *"
+    expect "row of $name" "$(row "$name")" "$name mapped [a-z]* 1 [1-9]* [0-9]*.[0-9] [0-9]*"
     expect "report of $name" "$(ls "out/$name/report.json" "out/$name/map.pcd")" "*report.json"
 done
-expect "row of broken" "$(row broken)" "broken failed - - - broken: no calibration: *"
+expect "row of broken" "$(row broken)" "broken failed - - - - - broken: no calibration: *"
 expect "printed table" "$(tail -n 4 printed)" "$(cat out/table.txt)"
+expect "page" "$(cat out/index.html)" "*2 of 3 recordings*one slider*one%20slider/map.html*one%20slider/overview.png*broken: no calibration*"
 expect "tries" "$(tries 'one slider') $(tries broken) $(tries killed)" "1 1 2"
 
 map 1 list # finished recordings are not mapped again, not even without GNU parallel's log
@@ -57,7 +58,7 @@ expect "repaired row" "$(row broken)" "broken mapped *"
 expect "calls after the repair" "$(wc -l <calls)" 5
 
 rm -r "out/one slider" # a removed result is made again, and so is one whose status file is damaged
-expect "removed row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider not run - - - its result was removed*"
+expect "removed row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider not run - - - - - its result was removed*"
 echo '{}' >out/log/killed.status
 map 0 list
 expect "calls after the removal" "$(wc -l <calls)" 7
@@ -70,7 +71,7 @@ expect "escaped name" "$(cat names)" '$*303*266*'
 sed -i 's/"quality"/"of before"/; s/^{/{ "quality": {"word": "doubtful", "reasons": ["few events"]},/' "out/one slider/report.json"
 map 0 names
 expect "row of the name" "$(row $'br\303\266ken')" $'br\303\266ken one mapped *'
-expect "doubtful row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider mapped *doubtful: few events*"
+expect "doubtful row" "$("$many/recordings.py" table list out | grep '^one slider' | tr -s ' ')" "one slider mapped doubtful *few events*"
 
 [ $failures = 0 ] && echo "passed"
 exit $((failures > 0))

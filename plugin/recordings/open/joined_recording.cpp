@@ -57,7 +57,7 @@ class JoinedRecording : public Recording {
                                     parts_.poses.back().t_ns - offsetOf(i));
     }
     if (!parts_.all_poses) cutPoses(limits, parts_.poses);
-    if (!limits.t0_ns && !limits.t1_ns) requireEvents();
+    if (!limits.t0_ns && !limits.t1_ns && !parts_.only_poses) requireEvents();
   }
 
   std::optional<Sample> read() override {
@@ -168,6 +168,7 @@ class JoinedRecording : public Recording {
 
   /// Reads the next packet and object. After damage of the events, only poses come.
   void readAhead() {
+    if (parts_.only_poses) return;
     if (!packet_ && !damaged_) packet_ = nextPacket();
     while (parts_.others && !other_ && !damaged_) {
       other_ = parts_.others->next();

@@ -23,6 +23,7 @@ struct JoinedParts {
   std::string poses_damage;  ///< The error that ended the poses: thrown at the recording's end.
   std::unique_ptr<OtherStream> others;  ///< Other objects; may be null.
   bool all_poses = false;       ///< True if poses outside the interval are kept, for a mapping.
+  bool only_poses = false;      ///< True if the events are not read.
   std::int64_t latency_ns = 0;  ///< Delay of each pose after its time.
   /// The maximum number of bad events that are left out, of all cameras together. One more is an
   /// error.

@@ -501,6 +501,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   joined.poses_damage = std::move(parts.poses_damage);
   if (!source.complete) joined.others = std::move(parts.others);
   joined.all_poses = source.complete;
+  joined.only_poses = source.only_poses;
   joined.latency_ns = source.faults.latency_ns;
   joined.skip_bad_events = source.skip_bad_events;
   joined.warnings = std::move(parts.warnings);

@@ -38,6 +38,7 @@ struct RecordingSource {
   /// True if missing poses, or a missing calibration, are an error. Cameras without a calibration
   /// have a model without a focal length.
   bool complete = true;
+  bool only_poses = false;  ///< True if the events are not read.
 };
 
 /// Reads calibration and hand-eye transform.

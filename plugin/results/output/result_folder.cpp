@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 constexpr const char* kReport = "report.json";
 constexpr const char* kKeyframes = "keyframes";
 constexpr const char* kLock = "run.lock";
+constexpr const char* kStatus = "status.json";  // of a shard or a join
 constexpr const char* kSession = "session.mcap";
 constexpr std::array<std::string_view, 9> kMapFiles = {
     "map.html",      "map.pcd",      "map.png",        "map.ply",
@@ -74,7 +75,7 @@ bool isFileOf(Level level, const std::string& name, Kinds kinds) {
     case Level::kResult:
       return (kinds.map && isIn(kMapFiles, name)) ||
              (kinds.depth && (isIn(kDepthFiles, name) || isIn(kImages, name))) || name == kReport ||
-             name == kLock;
+             name == kLock || name == kStatus;
     case Level::kKeyframes:
       return false;
     case Level::kKeyframe:
@@ -248,12 +249,6 @@ void rejectInTheWay(const fs::path& target, Kinds kinds) {
   }
 }
 
-std::string hostName() {
-  std::array<char, HOST_NAME_MAX + 1> name{};
-  ::gethostname(name.data(), HOST_NAME_MAX);
-  return name.data();
-}
-
 /// The run that is at work in a folder.
 struct Worker {
   std::string name = "another run";  // "process 42 on HOST"
@@ -333,6 +328,12 @@ bool canBeRenamed(const fs::path& folder) {
 }
 
 }  // namespace
+
+std::string hostName() {
+  std::array<char, HOST_NAME_MAX + 1> name{};
+  ::gethostname(name.data(), HOST_NAME_MAX);
+  return name.data();
+}
 
 void makeFolder(const fs::path& folder) {
   std::error_code error;
@@ -428,7 +429,7 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
                          std::any_of(kImages.begin(), kImages.end(), has);
   if (!earlierResult(places.target)) {
     const auto is_left = [&](const fs::path& path) {
-      return path == places.partial || path == places.left;
+      return path == places.partial || path == places.left || path == places.target / kStatus;
     };
     const fs::directory_iterator entries(places.target);
     if (std::all_of(begin(entries), end(entries), is_left)) return;
@@ -583,7 +584,10 @@ void ResultFolder::replace(bool is_whole) {
   const auto& [target, in_place, partial, left, earlier, moving] = places_;
   stays_ = replaces_ = true;
   const ResultFiles found = filesIn(partial);
-  for (const fs::path& file : found.files) syncToDisk(partial / file);
+  for (const fs::path& file : found.files) {
+    // A file with a second name is that of an earlier result, or of a shard: it is on the disk.
+    if (fs::hard_link_count(partial / file) == 1) syncToDisk(partial / file);
+  }
   for (const fs::path& folder : found.folders) syncToDisk(partial / folder);
   syncToDisk(partial);
   Places used = places_;

@@ -48,6 +48,8 @@ struct EarlierResult {
 /// result.earlier. At the end the earlier files are moved one by one to result.moving, which is
 /// then renamed to result.earlier. Then the new files are moved to OUT, report.json last. If OUT is
 /// a symbolic link, this applies to its target.
+///
+/// A file status.json in OUT, of a shard or a join at work, is removed with the earlier result.
 class ResultFolder {
  public:
   /// Rejects a folder that is not for a result: another run is at work there, or, without `force`,
@@ -144,6 +146,9 @@ class ResultFolder {
   bool stays_ = false;
   bool replaces_ = false;  ///< `commit` was called.
 };
+
+/// Returns the name of this machine.
+std::string hostName();
 
 /// Makes a folder and those above it. @throws std::runtime_error naming the folder.
 void makeFolder(const std::filesystem::path& folder);

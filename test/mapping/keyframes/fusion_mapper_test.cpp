@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <opencv2/core.hpp>
+#include <random>
 #include <stdexcept>
 #include <utility>
 
@@ -95,6 +97,65 @@ TEST(FusionMapper, TheOnlyWindowIsMappedAtTheEndEvenIfItIsNotFull) {
   EXPECT_EQ(keyframes[0].events[0], 151U);
   EXPECT_EQ(mapper.counts().total()[EventFate::kWithoutPose], 99U);
   EXPECT_EQ(mapper.counts().total()[EventFate::kOutsideWindow], 50U);
+}
+
+/// A plan finds the windows and the counts of a mapping. Some of these windows alone, with the
+/// events of `interval` alone, make the same keyframes: the filters remember no earlier event.
+TEST(FusionMapper, PlannedWindowsNeedNoEventBeforeTheirInterval) {
+  FusionMapperOptions options = period(0.1, 0.07);
+  options.filter.hot_pixels = true;
+  options.filter.hot_pixel.min_events = 20;
+  options.filter.hot_pixel.period_s = 0.15;
+  options.filter.background_activity_s = 0.01;
+  std::mt19937 random(5);
+  std::vector<std::vector<Event>> events(2);
+  for (std::vector<Event>& of_camera : events) {
+    for (int ms = 0; ms < 2000; ++ms) {
+      const auto pixel = [&] { return static_cast<std::uint16_t>(random() % 16); };
+      for (int i = 0; i < 3; ++i) of_camera.push_back({at(ms), pixel(), pixel(), true});
+      if (ms / 300 % 2 == 0) of_camera.push_back({at(ms), 7, 7, true});  // hot at times
+    }
+  }
+  const auto mapped = [&](const FusionMapperOptions& with, MapperCounts& counts) {
+    Mapper mapper(with, 2);
+    mapper.addPoses(0, 2100);
+    for (int camera = 0; camera < 2; ++camera) {
+      std::vector<Event> part;
+      std::copy_if(events[camera].begin(), events[camera].end(), std::back_inserter(part),
+                   [&](const Event& event) { return with.interval().contain(event.t_ns); });
+      mapper.addEvents(camera, part);
+    }
+    std::vector<KeyframeDepthMap> keyframes = mapper.end();
+    counts = mapper.counts();
+    return keyframes;
+  };
+  MapperCounts counts, planned_counts;
+  const std::vector<KeyframeDepthMap> all = mapped(options, counts);
+  ASSERT_GT(all.size(), 20U);
+  EXPECT_GT(counts.total()[EventFate::kFiltered], 1000U);
+
+  FusionMapperOptions planning = options;
+  std::vector<Window> windows;
+  planning.on_planned = [&](const Window& window, std::uint64_t of_window) {
+    const auto& made = all.at(windows.size());
+    EXPECT_EQ(of_window, made.events[0] + made.events[1]);
+    windows.push_back(window);
+  };
+  EXPECT_TRUE(mapped(planning, planned_counts).empty());
+  ASSERT_EQ(windows.size(), all.size());
+  EXPECT_EQ(planned_counts.cameras, counts.cameras);
+
+  for (const std::size_t begin : {std::size_t{0}, std::size_t{7}, all.size() - 2}) {
+    FusionMapperOptions part = options;
+    part.planned_windows.assign(windows.begin() + static_cast<std::ptrdiff_t>(begin),
+                                windows.end());
+    const std::vector<KeyframeDepthMap> made = mapped(part, planned_counts);
+    ASSERT_EQ(made.size(), all.size() - begin);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      EXPECT_EQ(made[i].events, all[begin + i].events);
+      EXPECT_EQ(cv::countNonZero(made[i].map.depth != all[begin + i].map.depth), 0);
+    }
+  }
 }
 
 TEST(FusionMapper, NoTimeOverflowsWithTheOffsetOfItsCamera) {

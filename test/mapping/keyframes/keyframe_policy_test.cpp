@@ -103,7 +103,7 @@ TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrDropped) {
   const Recording recording = startingAt(kStart_ns);
   for (const std::int64_t t_ref_ns : {5, 15}) {
     const Window window{10, 20, t_ref_ns};
-    const auto fresh = [&] { return makeSingleWindowPolicy(window); };
+    const auto fresh = [&] { return makeGivenWindowsPolicy({window}); };
     auto policy = fresh();
     EXPECT_EQ(policy->current(recording)->t0_ns, 10);
     EXPECT_EQ(policy->earliestStart(recording), 10);

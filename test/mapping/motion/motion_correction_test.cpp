@@ -28,7 +28,7 @@ using test::same;
 
 constexpr std::int64_t kMillisecond = 1'000'000;
 
-TEST(MotionCorrectionKnots, CoverTheWindowWithOneAtTheReference) {
+TEST(MotionCorrectionKnots, LieInTheWindowWithOneAtTheReference) {
   const struct {
     Window window;
     std::size_t reference;
@@ -36,13 +36,23 @@ TEST(MotionCorrectionKnots, CoverTheWindowWithOneAtTheReference) {
   } cases[] = {{{0, 200 * kMillisecond, 100 * kMillisecond}, 10, 21},
                {{0, 205 * kMillisecond, 0}, 0, 22},
                {{0, 95 * kMillisecond, 95 * kMillisecond}, 10, 11},
-               {{0, 5 * kMillisecond, 2 * kMillisecond}, 1, 3},
+               {{0, 5 * kMillisecond, 2 * kMillisecond}, 0, 2},
+               {{0, 213 * kMillisecond, 213 * kMillisecond / 2}, 11, 23},
                {{50 * kMillisecond, 60 * kMillisecond, 0}, 0, 7},
                {{0, 10 * kMillisecond, 20 * kMillisecond}, 2, 3}};
   for (const auto& c : cases) {
     const MotionCorrection knots = knotsOf(c.window, 0.01);
     EXPECT_EQ(knots.reference, c.reference);
     EXPECT_EQ(knots.knots.size(), c.knots);
+    EXPECT_LE(knots.spacing_s, 0.01 * (1 + 1e-9));
+    const auto [first_ns, last_ns] =
+        std::minmax({c.window.t0_ns, c.window.t1_ns, c.window.t_ref_ns});
+    EXPECT_TRUE(timeOfKnot(knots, 0, c.window) <= first_ns + 1 ||
+                timeOfKnot(knots, c.knots - 1, c.window) >= last_ns - 1);
+    for (std::size_t i = 0; i < c.knots; ++i) {
+      EXPECT_TRUE(timeOfKnot(knots, i, c.window) >= first_ns &&
+                  timeOfKnot(knots, i, c.window) <= last_ns);
+    }
     EXPECT_TRUE(isSame(knots.displacement(0.003), Rigid3{}));
   }
 }
