@@ -261,16 +261,18 @@ int runPlan(const PlanArguments& arguments) {
                                    [](const KeyframeRange& s) { return s.begin == s.end; });
   fmt::print("{} keyframes in {} shards; written to {}\n", keyframes, plan.shards.size(),
              arguments.out.string());
-  const auto [read_s, reach_s] = std::pair(plan.map->read_s, plan.map->reach_s);
-  if (!plan.map->from_begin.empty() || reach_s > std::max(1.0, 0.2 * read_s)) {
-    fmt::print("each shard reads the recording from its begin: up to {:.3g} s each{}{}\n",
-               std::max(read_s, reach_s), plan.map->from_begin.empty() ? "" : ": ",
-               plan.map->from_begin);
+  const PlannedMap& map = *plan.map;
+  if (!map.from_begin.empty()) {
+    fmt::print("each shard reads the recording from its begin, up to {:.3g} s: {}\n", map.read_s,
+               map.from_begin);
+  } else if (map.reach_s > std::max(1.0, 0.5 * map.read_s)) {
+    fmt::print("each shard takes up to {:.3g} s to reach its part; all is read in {:.3g} s\n",
+               map.reach_s, map.read_s);
   } else {
     fmt::print(
-        "a shard reads its part: the last keyframe's events are reached in {:.2g} s, all "
-        "take {:.3g} s\n",
-        reach_s, read_s);
+        "a shard reads its part: it reaches the last keyframe's events in {:.2g} s; all are "
+        "read in {:.2g} s\n",
+        map.reach_s, map.read_s);
   }
   if (empty > 0) {
     fmt::print("empty: the last {} of them: there are {} blocks of {} keyframes\n", empty, blocks,

@@ -714,6 +714,7 @@ PlannedMap planMap(MapJob given) {
   job.options.mapper.on_planned = [&](const Window& window, std::uint64_t events) {
     plan.keyframes.push_back({window, events});
   };
+  const double looked_s = look.first.times.real.read;  // a short recording is not read again
   const auto began = std::chrono::steady_clock::now();
   RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity,
                          interruptible(job, "planning"), "planning");
@@ -726,7 +727,7 @@ PlannedMap planMap(MapJob given) {
     throw std::runtime_error("there is no keyframe: " + why);
   }
   if (plan.pass.read.skipped_events > 0) plan.from_begin = "bad events are left out";
-  plan.read_s = secondsSince(began);
+  plan.read_s = looked_s + secondsSince(began);
   job.plan = std::make_shared<PlannedMap>(plan);
   job.options.mapper.planned_windows = {plan.keyframes.back().window};
   const auto opened = std::chrono::steady_clock::now();
