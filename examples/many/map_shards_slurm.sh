@@ -30,17 +30,24 @@ shards=$1 out=$2
 shift 2
 case $STEP_OF_SHARDS in
     plan) command=(plan "$@" --shards "$shards" --out "$out.shards/plan.json") ;;
-    shard) command=(map --plan "$out.shards/plan.json" --out "$out.shards/$SLURM_ARRAY_TASK_ID" --quiet) ;;
-    join) command=(join "$out.shards/plan.json" "$out.shards"/[0-9]* --out "$out") ;;
+    shard)
+        k=$SLURM_ARRAY_TASK_ID
+        command=(map --plan "$out.shards/plan.json" --shard "$k" --out "$out.shards/$k" --quiet)
+        ;;
+    join)
+        command=(join "$out.shards/plan.json" --out "$out")
+        for ((k = 0; k < shards; ++k)); do command+=("$out.shards/$k"); done
+        ;;
 esac
 "$program" "${command[@]}" &
 trap 'kill -TERM $!' TERM # a minute before the time limit
 while wait $!; status=$?; kill -0 $! 2>/dev/null; do :; done
 
 # 75: another try may succeed. So may one of a program that was killed: Slurm does not try it again by itself.
-if [ "$status" = 75 ] || [ "$status" -gt 128 ]; then
-    [ "${SLURM_RESTART_COUNT:-0}" -lt 3 ] || exit 1
-    scontrol requeue "${SLURM_ARRAY_JOB_ID:-$SLURM_JOB_ID}${SLURM_ARRAY_TASK_ID:+_$SLURM_ARRAY_TASK_ID}" &&
-        sleep 60 # Slurm ends this script
+# 130: the plan was stopped, and cannot go on. A job that was cancelled runs no more.
+if [ "$status" = 75 ] || { [ "$status" -gt 128 ] && [ "$status" != 130 ]; }; then
+    job=${SLURM_ARRAY_JOB_ID:-$SLURM_JOB_ID}${SLURM_ARRAY_TASK_ID:+_$SLURM_ARRAY_TASK_ID}
+    [ "${SLURM_RESTART_COUNT:-0}" -lt 3 ] && [ "$(squeue -h -j "$job" -o %T)" = RUNNING ] || exit 1
+    scontrol requeue "$job" && sleep 60 # Slurm ends this script
 fi
 exit "$status"

@@ -217,7 +217,10 @@ def table(list_file, out):
         cells = [cell.rjust(width) if column in NUMBERS else cell.ljust(width)
                  for column, cell, width in zip(COLUMNS, text, widths)]
         print("  ".join(cells).rstrip())
-    write(out / "index.html", page(out, rows))
+    try:
+        write(out / "index.html", page(out, rows))
+    except OSError as error:
+        print(f"error: {out}/index.html: {error.strerror}", file=sys.stderr)
     return 0 if all(cells["status"] == "mapped" for cells in rows) else 1
 
 

@@ -16,11 +16,11 @@ PROGRAM = os.environ.get("EVENT_FUSION") or "event-fusion"
 
 def make_shard(plan: str, number: int, folder: str) -> None:
     command = [PROGRAM, "map", "--plan", plan, "--shard", str(number), "--out", folder, "--quiet"]
-    # 75, try again: also while the program of a worker that was killed still makes this shard.
-    while (result := subprocess.run(command, stderr=subprocess.PIPE, text=True)).returncode == 75:
-        time.sleep(2)
+    # The program of a worker that was killed goes on: then this one waits for it.
+    while "is writing its result there" in (result := subprocess.run(command, stderr=subprocess.PIPE, text=True)).stderr:
+        time.sleep(5)
     if result.returncode:
-        raise RuntimeError(result.stderr)
+        raise RuntimeError(f"shard {number}: status {result.returncode}: {result.stderr}")
 
 
 def main(shards: str, out: str, *recording: str) -> None:
@@ -29,7 +29,7 @@ def main(shards: str, out: str, *recording: str) -> None:
     os.makedirs(os.path.dirname(plan), exist_ok=True)
     subprocess.run([PROGRAM, "plan", *recording, "--shards", shards, "--out", plan], check=True)
     with dask.Client(os.environ.get("DASK_SCHEDULER")) as client:
-        made = [client.submit(make_shard, plan, number, folder) for number, folder in enumerate(folders)]
+        made = [client.submit(make_shard, plan, number, folder, retries=2) for number, folder in enumerate(folders)]
         dask.progress(made)
         client.gather(made)
     subprocess.run([PROGRAM, "join", plan, *folders, "--out", out], check=True)

@@ -18,6 +18,7 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "plugin/app/commands.h"
 #include "plugin/app/program.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/playback/session_map.h"
 #include "plugin/playback/stored_run.h"
 #include "plugin/results/output/result_folder.h"
@@ -56,14 +57,24 @@ Plan Plan::read(const fs::path& file) {
               json.at("arguments"),
               std::make_shared<PlannedMap>(PlannedMap::of(json)),
               {}};
+    const std::vector<PlannedMap::Keyframe>& keyframes = plan.map->keyframes;
     std::uint64_t begin = 0;
-    for (const Json& shard : json.at("shards")) {
-      plan.shards.push_back({shard.at("begin"), shard.at("end")});
-      if (plan.shards.back().begin != begin || plan.shards.back().end < begin) break;
-      begin = plan.shards.back().end;
+    for (const Json& json_of : json.at("shards")) {
+      const KeyframeRange& shard =
+          plan.shards.emplace_back(KeyframeRange{json_of.at("begin"), json_of.at("end")});
+      const bool is_block =
+          shard.end % KeyframeMapper::kBlockKeyframes == 0 || shard.end == keyframes.size();
+      if (shard.begin != begin || shard.end < begin || !is_block) break;
+      begin = shard.end;
     }
-    if (begin != plan.map->keyframes.size())
-      throw std::runtime_error("expected shards that divide all its keyframes");
+    const auto is_before = [](const PlannedMap::Keyframe& a, const PlannedMap::Keyframe& b) {
+      return a.window.t0_ns < b.window.t0_ns;
+    };
+    if (keyframes.empty() || plan.shards.empty() || begin != keyframes.size() ||
+        plan.shards.back().end != begin ||
+        !std::is_sorted(keyframes.begin(), keyframes.end(), is_before)) {
+      throw std::runtime_error("expected keyframes in order, and shards that divide them all");
+    }
     return plan;
   } catch (const Json::exception&) {
     throw std::runtime_error(file.string() + ": no plan: expected a file of `event-fusion plan`");
@@ -136,8 +147,7 @@ class StatusFile {
   StatusFile(const fs::path& out, bool force) {
     try {
       ResultFolder::require(out, OutputKind::kMap, force);
-      fs::create_directories(out);
-      file_ = fs::absolute(out) / "status.json";
+      folder_ = fs::absolute(out);
     } catch (const std::exception&) {
     }
     json_ = {{"state", "running"}, {"activity", "start"}, {"progress", 0.0}, {"reason", ""}};
@@ -151,7 +161,8 @@ class StatusFile {
   static std::string reasonIn(const fs::path& folder) {
     std::ifstream file(folder / "status.json");
     const Json status = Json::parse(file, nullptr, false);
-    return status.is_object() ? status.value("reason", "") : "";
+    const Json reason = status.is_object() ? status.value("reason", Json()) : Json();
+    return reason.is_string() ? reason.get<std::string>() : "";
   }
 
   void show(const char* activity, double progress) {
@@ -176,16 +187,14 @@ class StatusFile {
   void write() {
     written_ = std::chrono::steady_clock::now();
     json_["time"] = now();
-    if (file_.empty()) return;
+    if (folder_.empty()) return;
     try {
-      writeAtomically(file_, byStream([&](std::ostream& stream) {
-                        stream << json_.dump(1, ' ', false, Json::error_handler_t::replace) << '\n';
-                      }));
+      writeStatus(folder_, json_.dump(1, ' ', false, Json::error_handler_t::replace));
     } catch (const std::exception&) {  // no room: the shard says so
     }
   }
 
-  fs::path file_;
+  fs::path folder_;
   Json json_;
   std::chrono::steady_clock::time_point written_;
 };
@@ -212,8 +221,9 @@ int runPlanned(MapArguments arguments) {
   } catch (const UsageError& error) {
     status.end(kUsageStatus, error.what());
     throw;
-  } catch (const PartDiffers&) {
-    throw;
+  } catch (const PartDiffers& error) {
+    if (arguments.keyframes && arguments.planned->from_begin.empty()) throw;
+    result = failed(std::string(error.what()) + ": expected the recording of the plan", false);
   } catch (const Interrupted& interrupted) {
     result = failed(interrupted.what(), true);
   } catch (const std::exception& error) {
@@ -227,7 +237,12 @@ int runPlanned(MapArguments arguments) {
 }  // namespace
 
 int runPlan(const PlanArguments& arguments) {
-  if (fs::exists(arguments.out)) Plan::read(arguments.out);  // nothing else is replaced
+  if (fs::exists(arguments.out)) {  // nothing else is replaced
+    const Json earlier = Json::parse(readBytes(arguments.out), nullptr, false);
+    if (!earlier.is_object() || !earlier.contains("plan")) {
+      throw std::runtime_error(arguments.out.string() + ": no plan: expected a new file");
+    }
+  }
   MapArguments of_map = mapArgumentsOf(arguments.words);
   if (arguments.verbosity == Verbosity::kQuiet) of_map.verbosity = Verbosity::kQuiet;
   for (const fs::path& file : of_map.source.files) {
@@ -255,7 +270,9 @@ int runPlan(const PlanArguments& arguments) {
     plan.shards.push_back({begin_of(k), begin_of(k + 1)});
   }
   plan.write();
-  if (!plan.map->pass.error.empty()) return fail(plan.map->pass.error);
+  if (!plan.map->pass.error.empty()) {
+    printWarnings({{"damaged", plan.map->pass.error + ": the map ends there"}});
+  }
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   const auto empty = std::count_if(plan.shards.begin(), plan.shards.end(),
                                    [](const KeyframeRange& s) { return s.begin == s.end; });
@@ -298,16 +315,12 @@ int runShard(const MapArguments& arguments) {
   of_shard.force |= arguments.force;
   try {
     return runPlanned(of_shard);
-  } catch (const PartDiffers&) {
-    plan.map->from_begin = "the part was read in another way";
-  }
-  try {
-    return runPlanned(of_shard);  // goes on with the keyframes that are right
   } catch (const PartDiffers& error) {
-    const std::string text = std::string(error.what()) + ": expected the recording of the plan";
-    StatusFile(of_shard.out, of_shard.force).end(kFailedStatus, text);
-    return fail(text);
+    printWarnings(
+        {{"shard", std::string(error.what()) + ": it reads the recording from its begin"}}, "note");
+    plan.map->from_begin = "the part has other events";
   }
+  return runPlanned(of_shard);  // goes on after the keyframes that are right
 }
 
 int runJoin(const JoinArguments& arguments) {

@@ -294,11 +294,11 @@ void requirePlanned(const PlannedMap& plan, std::uint64_t number, const Keyframe
   const std::uint64_t unused = keyframe.without_pose + keyframe.outside_lens + keyframe.over_budget;
   const std::uint64_t events =
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), unused);
-  if (events == plan.keyframes[number].events) return;
+  const PlannedMap::Keyframe& planned = plan.keyframes.at(number);
+  if (events == planned.events && keyframe.window.t0_ns == planned.window.t0_ns) return;
   if (damage) throw ShardError(damage->text);
   throw PartDiffers(fmt::format("keyframe {} at {} s has {} events, by the plan {}", number,
-                                formatSeconds(keyframe.window.t_ref_ns), events,
-                                plan.keyframes[number].events));
+                                formatSeconds(keyframe.window.t_ref_ns), events, planned.events));
 }
 
 /// Warns if stored keyframes are of a kernel that rounds in another way.
@@ -427,7 +427,8 @@ class ShardImages {
     std::filesystem::copy(from, result / name, Options::recursive | Options::create_hard_links,
                           error);
     if (error) {
-      std::filesystem::copy(from, result / name, Options::recursive | Options::overwrite_existing);
+      std::filesystem::remove_all(result / name);
+      std::filesystem::copy(from, result / name, Options::recursive);
     }
     ++copied_;
   }
@@ -649,7 +650,10 @@ MapResult mapInto(MapJob given) {
     }
     if (job.on_last_keyframe) job.on_last_keyframe(run);
     writer.finish();
-    if (job.shard && number < job.shard->end && run.error()) throw ShardError(run.error()->text);
+    if (job.shard && number < job.shard->end && !(job.stop && job.stop())) {
+      if (run.error()) throw ShardError(run.error()->text);
+      throw PartDiffers(fmt::format("keyframe {} of the plan has no events, or no pose", number));
+    }
 
     StageTimes exporting;
     std::shared_ptr<const MapSnapshot> map;
@@ -722,6 +726,12 @@ PlannedMap planMap(MapJob given) {
   }
   if (run.error() && run.error()->wrong) throw *run.error()->wrong;
   plan.pass = run.pass();
+  if (plan.pass.better_source) {
+    throw std::invalid_argument(
+        fmt::format("poses of {} begin after others were chosen, so that a map cannot be divided: "
+                    "expected rig.pose_source (--set rig.pose_source={})",
+                    asText(*plan.pass.better_source), plan.pass.better_source->label));
+  }
   if (plan.keyframes.empty()) {
     const std::string why = plan.pass.error.empty() ? "map RECORDING says why" : plan.pass.error;
     throw std::runtime_error("there is no keyframe: " + why);
@@ -732,9 +742,11 @@ PlannedMap planMap(MapJob given) {
   job.options.mapper.planned_windows = {plan.keyframes.back().window};
   const auto opened = std::chrono::steady_clock::now();
   const std::unique_ptr<Recording> part = openRecording(job.sourceNow());
-  for (auto sample = part->read(); sample && !std::holds_alternative<EventPacket>(*sample);) {
+  std::optional<Sample> sample;
+  do {
+    requireNoStop(job);
     sample = part->read();
-  }
+  } while (sample && !std::holds_alternative<EventPacket>(*sample));
   plan.reach_s = secondsSince(opened);
   return plan;
 }

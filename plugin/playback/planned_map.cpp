@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/playback/planned_map.h"
 
-#include <algorithm>
-#include <iterator>
-
 namespace efm {
 namespace {
 

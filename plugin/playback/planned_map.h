@@ -4,10 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mapping/events/window.h"
@@ -32,6 +30,8 @@ struct EventPass {
   std::optional<TimeSpan> events;
   RecordingCounts read;
   std::string error;  ///< Why the recording was not read to its end; empty: it was.
+  /// A source of poses that is better than the used one, but began too late. Not in files.
+  std::optional<PoseSourceId> better_source;
 
   /// Replaces the counts of events, and of windows without a keyframe.
   void replaceIn(SessionStatus& status, RecordingCounts& of_recording) const;

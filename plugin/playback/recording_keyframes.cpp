@@ -65,7 +65,10 @@ std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
   const bool is_planned = !options_.mapper.planned_windows.empty();
   if (is_planned && host_.on_progress) host_.on_progress(fraction());
   if (is_planned && progress_.due()) showProgress();
-  if (is_planned && ended_ && host_.stop) host_.stop();  // many come after the last sample
+  if (is_planned && ended_ && host_.stop && host_.stop()) {  // many come after the last sample
+    stopped_ = true;
+    return std::nullopt;
+  }
   while (true) {
     std::optional<KeyframeDepthMap> made;
     const bool maps = attempt([&] { made = options_.live.enabled ? takeMade() : mapper_->next(); });
@@ -213,7 +216,12 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, RunReport&
 
 EventPass RecordingKeyframes::pass() const {
   const SessionStatus status = mapper_->status();
-  return {status.counts, status.events, recording_.counts(), error_ ? error_->text : ""};
+  EventPass pass{status.counts, status.events, recording_.counts(), error_ ? error_->text : "", {}};
+  for (const auto& [source, count] : status.other_poses) {
+    const bool is_better = status.pose_source && source.kind < status.pose_source->kind;
+    if (is_better && options_.rig.pose_source.empty()) pass.better_source = source;
+  }
+  return pass;
 }
 
 void RecordingKeyframes::describe(RunReport& report) {

@@ -41,8 +41,9 @@ class RecordingKeyframes {
   struct Host {
     /// Returns whether the recording is to end here. May be empty; its exceptions end the run.
     std::function<bool()> stop;
-    std::function<void(double fraction)> on_progress;  ///< Called after each sample; may be empty.
-    DsiSink* sink = nullptr;                           ///< Receives every fused plane; may be null.
+    std::function<void(double fraction)>
+        on_progress;  ///< Called after each sample, and each planned keyframe; may be empty.
+    DsiSink* sink = nullptr;  ///< Receives every fused plane; may be null.
     /// What a pass over all events counted; may be null. It replaces the counts of this run, which
     /// reads a part of them.
     const EventPass* known = nullptr;

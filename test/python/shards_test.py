@@ -113,8 +113,17 @@ def test_an_unfinished_shard_goes_on_and_mistakes_are_named(planned, tmp_path):
     words = ("map", "--plan", tmp_path / "counts.json", "--shard", 1, "--out", tmp_path / "c", "-q")
     joined = ("join", tmp_path / "counts.json", *rest, tmp_path / "c", "--out", tmp_path / "out")
     assert f"keyframe {begin + 1} at" in program(*words, status=1) and "by the plan" in status_of(tmp_path / "c")["reason"]
-    assert f"shards 1 are missing: expected the folders of all; no session.mcap is in {tmp_path}/c (keyframe" in program(*joined, status=1)
+    assert f"{tmp_path}/c (keyframe {begin + 1} at" in program(*joined, status=1)
+    damaged = json.loads(plan.read_text())
+    damaged["shards"][1]["begin"] += 1
+    (tmp_path / "damaged.json").write_text(json.dumps(damaged))
+    assert "shards that divide them all" in program("map", "--plan", tmp_path / "damaged.json", "--shard", 1, "--out", tmp_path / "z", status=1)
+    (tmp_path / "z").mkdir(exist_ok=True)
+    (tmp_path / "z" / "status.json.new").write_text("")  # a process that was killed leaves it
+    assert "0 to 2" in program("map", "--plan", plan, "--shard", 3, "--out", tmp_path / "z", status=2)
+    program("map", "--plan", plan, "--shard", 1, "--out", tmp_path / "z", "-q")
     (tmp_path / "no.json").write_text("{}")
+    assert "no plan" in program("plan", DESK, "--shards", 2, "--out", tmp_path / "no.json", status=1)
     assert "no plan" in program("map", "--plan", tmp_path / "no.json", "--shard", 1, "--out", tmp_path / "z", status=1)
     for option in ("keyframes.policy=baseline", "depth.max_confidence=sequence", "live.enabled=true"):
         assert "cannot be divided" in program("plan", DESK, f"--set={option}", "--shards", 2, "--out", tmp_path / "p.json", status=2)

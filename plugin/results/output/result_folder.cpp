@@ -33,6 +33,7 @@ constexpr const char* kReport = "report.json";
 constexpr const char* kKeyframes = "keyframes";
 constexpr const char* kLock = "run.lock";
 constexpr const char* kStatus = "status.json";  // of a shard or a join
+constexpr const char* kNewStatus = "status.json.new";
 constexpr const char* kSession = "session.mcap";
 constexpr std::array<std::string_view, 9> kMapFiles = {
     "map.html",      "map.pcd",      "map.png",        "map.ply",
@@ -75,7 +76,7 @@ bool isFileOf(Level level, const std::string& name, Kinds kinds) {
     case Level::kResult:
       return (kinds.map && isIn(kMapFiles, name)) ||
              (kinds.depth && (isIn(kDepthFiles, name) || isIn(kImages, name))) || name == kReport ||
-             name == kLock || name == kStatus;
+             name == kLock || name == kStatus || name == kNewStatus;
     case Level::kKeyframes:
       return false;
     case Level::kKeyframe:
@@ -335,6 +336,13 @@ std::string hostName() {
   return name.data();
 }
 
+void writeStatus(const fs::path& out, const std::string& json) {
+  fs::create_directories(out);
+  // Not on the disk at once: after a crash of the machine, it says nothing that matters.
+  std::ofstream(out / kNewStatus) << json << '\n';
+  fs::rename(out / kNewStatus, out / kStatus);
+}
+
 void makeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -429,7 +437,8 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
                          std::any_of(kImages.begin(), kImages.end(), has);
   if (!earlierResult(places.target)) {
     const auto is_left = [&](const fs::path& path) {
-      return path == places.partial || path == places.left || path == places.target / kStatus;
+      return path == places.partial || path == places.left || path == places.target / kStatus ||
+             path == places.target / kNewStatus;
     };
     const fs::directory_iterator entries(places.target);
     if (std::all_of(begin(entries), end(entries), is_left)) return;

@@ -150,6 +150,9 @@ class ResultFolder {
 /// Returns the name of this machine.
 std::string hostName();
 
+/// Replaces status.json in the folder OUT of a result; the folder need not exist.
+void writeStatus(const std::filesystem::path& out, const std::string& json);
+
 /// Makes a folder and those above it. @throws std::runtime_error naming the folder.
 void makeFolder(const std::filesystem::path& folder);
 
