@@ -185,7 +185,7 @@ struct Scratch {
   std::vector<TileRays> rays;  // by input
   TileFusion fusion;
   TilePeaks fused;
-  TileVolume not_added;            // a plane that the peaks do not get
+  TileVolume not_added;  // a plane that the peaks do not get
   std::vector<TilePeaks> cameras;  // empty if not requested
   std::vector<std::uint64_t>
       interpolated;  // by camera: VoteCounts::interpolated, in units of weight
@@ -254,10 +254,8 @@ class TiledSweep {
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
     std::vector<TilePeaks> cameras(cameras_.size(), peaks);
     return {std::vector<TileRays>(rays_.inputs()),
-            TileFusion(options_.fusion, inputs_, keep, kernel_),
-            std::move(peaks),
-            TileVolume(1, kPixels),
-            std::move(cameras),
+            TileFusion(options_.fusion, inputs_, keep, kernel_), std::move(peaks),
+            TileVolume(1, kPixels), std::move(cameras),
             std::vector<std::uint64_t>(static_cast<std::size_t>(inputs_.cameras))};
   }
 

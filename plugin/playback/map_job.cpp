@@ -635,11 +635,12 @@ MapResult mapInto(MapJob given) {
       sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
       pictures.add(keyframe.map.depth, keyframe.view_events);
     });
-    RecordingKeyframes::Host host =
-        job.by_shards.empty() ? hostOf(job, "mapping") : interruptible(job, "joining");
-    if (!job.by_shards.empty()) host.known = &job.plan->pass;
+    const bool joins = !job.by_shards.empty();
+    const char* const activity = joins ? "joining" : "mapping";
+    RecordingKeyframes::Host host = joins ? interruptible(job, activity) : hostOf(job, activity);
+    if (joins) host.known = &job.plan->pass;
     RecordingKeyframes run(*look.recording, job.options, std::move(look.first), job.verbosity, host,
-                           job.by_shards.empty() ? "mapping" : "joining");
+                           activity);
     std::uint64_t number = job.shard ? job.shard->begin : 0;
     while (!job.shard || number < job.shard->end) {
       const auto keyframe = run.next();
@@ -692,10 +693,10 @@ MapResult mapInto(MapJob given) {
   }
 }
 
-PlannedMap planMap(MapJob given) {
-  Job job(std::move(given));
-  job.out.clear();
-  const EventFusionOptions& options = job.options;
+namespace {
+
+/// Rejects options with which a map cannot be divided.
+void requireDivisible(const EventFusionOptions& options) {
   const auto reject = [](const std::string& option) {
     throw std::invalid_argument(
         option +
@@ -711,6 +712,27 @@ PlannedMap planMap(MapJob given) {
   if (!options.session)
     throw std::invalid_argument(
         "output.session = false: shards need their sessions: expected true");
+}
+
+/// Returns the real time to open the recording again and reach the events of a window.
+double secondsToReach(Job& job, const Window& window) {
+  job.options.mapper.planned_windows = {window};
+  const auto opened = std::chrono::steady_clock::now();
+  const std::unique_ptr<Recording> part = openRecording(job.sourceNow());
+  std::optional<Sample> sample;
+  do {
+    requireNoStop(job);
+    sample = part->read();
+  } while (sample && !std::holds_alternative<EventPacket>(*sample));
+  return secondsSince(opened);
+}
+
+}  // namespace
+
+PlannedMap planMap(MapJob given) {
+  Job job(std::move(given));
+  job.out.clear();
+  requireDivisible(job.options);
   PlannedMap plan;
   plan.run = runOf(job);
   Look look = lookAt(job);
@@ -738,16 +760,9 @@ PlannedMap planMap(MapJob given) {
   }
   if (plan.pass.read.skipped_events > 0) plan.from_begin = "bad events are left out";
   plan.read_s = looked_s + secondsSince(began);
-  job.plan = std::make_shared<PlannedMap>(plan);
-  job.options.mapper.planned_windows = {plan.keyframes.back().window};
-  const auto opened = std::chrono::steady_clock::now();
-  const std::unique_ptr<Recording> part = openRecording(job.sourceNow());
-  std::optional<Sample> sample;
-  do {
-    requireNoStop(job);
-    sample = part->read();
-  } while (sample && !std::holds_alternative<EventPacket>(*sample));
-  plan.reach_s = secondsSince(opened);
+  // Where all is read from the begin, the interval does not count.
+  plan.reach_s =
+      plan.from_begin.empty() ? secondsToReach(job, plan.keyframes.back().window) : plan.read_s;
   return plan;
 }
 

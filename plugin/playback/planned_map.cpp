@@ -21,13 +21,14 @@ void visitCounts(Counts& counts, Read& read, const Visit& visit) {
 
 }  // namespace
 
-void EventPass::replaceIn(SessionStatus& status, RecordingCounts& of_recording) const {
-  Json values;
-  visitCounts(counts, read, [&](const char* key, const auto& value) { values[key] = value; });
-  visitCounts(status.counts, of_recording,
-              [&](const char* key, auto& value) { values.at(key).get_to(value); });
-  status.counts.cameras = counts.cameras;
+void EventPass::addTo(SessionStatus& status, RecordingCounts& of_recording) const {
+  status.counts += counts;
   status.events = events;
+  of_recording.sorted_events = read.sorted_events;
+  of_recording.lost_packets = read.lost_packets;
+  of_recording.undated_events = read.undated_events;
+  of_recording.skipped_events = read.skipped_events;
+  of_recording.first_skipped = read.first_skipped;
   of_recording.warnings = read.warnings;
 }
 

@@ -23,18 +23,17 @@ struct KeyframeRange {
   std::uint64_t size() const { return end - begin; }
 };
 
-/// What a pass over all events of a recording counts. A job that reads a part of them, or none,
-/// reports these counts.
+/// What a pass over all events of a recording counts. A job that reads none reports these counts.
 struct EventPass {
-  MapperCounts counts;
+  MapperCounts counts;  ///< Of the events, and of windows without a keyframe.
   std::optional<TimeSpan> events;
   RecordingCounts read;
   std::string error;  ///< Why the recording was not read to its end; empty: it was.
   /// A source of poses that is better than the used one, but began too late. Not in files.
   std::optional<PoseSourceId> better_source;
 
-  /// Replaces the counts of events, and of windows without a keyframe.
-  void replaceIn(SessionStatus& status, RecordingCounts& of_recording) const;
+  /// Adds the counts to those of a run that read no events.
+  void addTo(SessionStatus& status, RecordingCounts& of_recording) const;
 };
 
 /// What is known of a map before it is made: all that needs the whole recording.

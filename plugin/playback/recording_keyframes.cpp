@@ -63,11 +63,11 @@ bool RecordingKeyframes::attempt(const Step& step, bool is_input) {
 
 std::optional<KeyframeDepthMap> RecordingKeyframes::next() {
   const bool is_planned = !options_.mapper.planned_windows.empty();
-  if (is_planned && host_.on_progress) host_.on_progress(fraction());
-  if (is_planned && progress_.due()) showProgress();
-  if (is_planned && ended_ && host_.stop && host_.stop()) {  // many come after the last sample
-    stopped_ = true;
-    return std::nullopt;
+  if (is_planned) {  // many keyframes may come after the last sample
+    if (host_.on_progress) host_.on_progress(fraction());
+    if (progress_.due()) showProgress();
+    stopped_ = stopped_ || (ended_ && host_.stop && host_.stop());
+    if (stopped_) return std::nullopt;
   }
   while (true) {
     std::optional<KeyframeDepthMap> made;
@@ -228,7 +228,7 @@ void RecordingKeyframes::describe(RunReport& report) {
   SessionStatus status = mapper_->status();
   RecordingCounts read = recording_.counts();
   if (host_.known != nullptr) {
-    host_.known->replaceIn(status, read);
+    host_.known->addTo(status, read);
     if (!error_ && !host_.known->error.empty()) error_ = UserError{host_.known->error};
   }
   const FusionMapperOptions& options = options_.mapper;

@@ -44,8 +44,7 @@ class RecordingKeyframes {
     std::function<void(double fraction)>
         on_progress;  ///< Called after each sample, and each planned keyframe; may be empty.
     DsiSink* sink = nullptr;  ///< Receives every fused plane; may be null.
-    /// What a pass over all events counted; may be null. It replaces the counts of this run, which
-    /// reads a part of them.
+    /// What a pass over all events counted, if this run reads none; else null.
     const EventPass* known = nullptr;
   };
 
