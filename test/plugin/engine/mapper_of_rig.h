@@ -63,13 +63,30 @@ inline EventFusionOptions live(EventFusionOptions options = syntheticOptions()) 
   return options;
 }
 
-/// Adds a sample when the mapping has taken the previous sample. So the queue never overflows, even
-/// on a slow machine.
+/// Returns a camera's counts. If all its packets were rejected, the rig lacks it: all are 0.
+inline EventCounts countsOf(const SessionStatus& status, int camera) {
+  const auto index = static_cast<std::size_t>(camera);
+  return index < status.counts.cameras.size() ? status.counts.cameras[index] : EventCounts{};
+}
+
+/// Returns how many of a camera's events the session has read or rejected.
+inline std::uint64_t readOf(const SessionStatus& status, int camera) {
+  const auto rejected = status.rejected_events.find(camera);
+  return countsOf(status, camera).read +
+         (rejected == status.rejected_events.end() ? 0 : rejected->second);
+}
+
+/// Adds a sample when the status counts all events of the samples before it. So the queue never
+/// overflows, even on a slow machine, and the status after a packet does not depend on the threads.
 inline void addPatiently(Mapper& mapper, const Samples& samples) {
   const auto waits = [&] {
     const SessionStatus status = mapper.status();
     return status.live && std::any_of(status.live->cameras.begin(), status.live->cameras.end(),
-                                      [](const auto& camera) { return camera.second.queued > 0; });
+                                      [&](const auto& camera) {
+                                        const auto& [index, queue] = camera;
+                                        return queue.queued > 0 ||
+                                               queue.taken != readOf(status, index);
+                                      });
   };
   for (const Sample& sample : samples) {
     mapper.add(sample);
@@ -89,20 +106,12 @@ inline std::shared_ptr<const MapSnapshot> mapOf(const EventFusionOptions& option
   return mapper.snapshot();
 }
 
-/// Returns a camera's counts. If all its packets were rejected, the rig lacks it: all are 0.
-inline EventCounts countsOf(const SessionStatus& status, int camera) {
-  const auto index = static_cast<std::size_t>(camera);
-  return index < status.counts.cameras.size() ? status.counts.cameras[index] : EventCounts{};
-}
-
 /// Expects that each event has one count in live operation.
 inline void expectSumsAgree(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     EXPECT_EQ(queue.received, queue.held + queue.queued + queue.taken + queue.fates.total());
     const EventCounts counts = countsOf(status, camera);
-    const auto rejected = status.rejected_events.find(camera);
-    EXPECT_EQ(queue.taken,
-              counts.read + (rejected == status.rejected_events.end() ? 0 : rejected->second));
+    EXPECT_EQ(queue.taken, readOf(status, camera));
     EXPECT_EQ(counts.read, counts.fates.total());
   }
 }
