@@ -73,10 +73,12 @@ double LiveOptions::queueEvents() const {
 
 void limitWindow(double max_s, const std::string& reason, KeyframePolicyOptions& policy,
                  std::vector<ChosenOption>& chosen) {
+  constexpr double kMinS = 2e-6;  // with half of it, the stride, as an allowed value
   for (ChosenOption& option : chosen) {
     double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
     if (option.key == "stride_s") value_s = &policy.stride_s;
-    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
+    const double limit_s =
+        value_s == &policy.stride_s ? policy.window_s / 2 : std::max(max_s, kMinS);
     if (value_s == nullptr || *value_s <= limit_s) continue;
     *value_s = option.value = limit_s;
     option.reason = reason;

@@ -228,6 +228,21 @@ TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
   EXPECT_EQ(status.live->dropRatio(), 0);
 }
 
+/// The rate within a nanosecond is 1e10 events/s: a window of 0.05 us would not be allowed.
+TEST(LiveMapper, OptionsAreChosenFromEventsOfOneTime) {
+  SyntheticRecording recording(0.3);
+  const Event event{SyntheticRecording::kStartNs + 105 * kMsNs, 60, 40, true};
+  for (std::vector<Event>& events : recording.events) events.assign(10, event);
+  EventFusionOptions options = live();
+  options.automatic = defaultOptions().automatic;
+  options.live.max_queue_events = 1000;
+  MapperOfRig mapper(options);
+  play(mapper, samplesOf(recording));
+  const SessionStatus status = mapper.status();
+  expectSumsAgree(status);
+  EXPECT_EQ(status.live->last_error, "");
+}
+
 TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnError) {
   Samples samples = samplesOf(SyntheticRecording(3));
   for (std::size_t i = samples.size() / 2; i < samples.size(); ++i) {
