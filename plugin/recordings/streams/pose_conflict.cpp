@@ -142,7 +142,11 @@ std::vector<std::size_t> findWrongTimes(const std::vector<StampedPose>& poses) {
   if (kMinRight * out_of_order > poses.size()) return {};
   std::vector<std::size_t> wrong;
   for (std::size_t begin = 0, end = 0; begin < poses.size(); begin = end) {
-    for (end = begin + 1; end < poses.size() && right[end] == right[begin];) ++end;
+    const auto goes_on = [&] {  // a late pose may lie beside a burst
+      return right[end] == right[begin] &&
+             std::abs(poses[end].t_ns - poses[end - 1].t_ns) < kFarAheadNs;
+    };
+    for (end = begin + 1; end < poses.size() && goes_on();) ++end;
     if (right[begin]) continue;
     const auto first = poses.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = poses.begin() + static_cast<std::ptrdiff_t>(end);

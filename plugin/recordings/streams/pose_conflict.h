@@ -33,10 +33,11 @@ std::optional<PoseConflict> findPoseConflict(const std::vector<StampedPose>& pos
 /// in bursts.
 ///
 /// The rule: the longest sequence of poses whose times do not go back is right. Of the others,
-/// poses in a row are wrong that span less than a second, where the times leap and leap back, and
-/// which mostly differ from the motion of the right ones at their times, or lie over a second
-/// before or after all right ones. The rest came late only. If over a third of the poses are out of
-/// order, the file has another order, and no pose is wrong.
+/// poses in a row, without a leap of a second between them, are wrong if they span less than a
+/// second, the times leap before them and leap back after them, and they mostly differ from the
+/// motion of the right ones at their times, or lie over a second before or after all right ones.
+/// The rest came late only. If over a third of the poses are out of order, the file has another
+/// order, and no pose is wrong.
 /// @param poses in the order of the file. @return their indices.
 std::vector<std::size_t> findWrongTimes(const std::vector<StampedPose>& poses);
 

@@ -258,9 +258,14 @@ TEST_F(PoseFile, OneFileHasOneTrajectoryAndAnErrorTellsHowToTakeIt) {
 // Of a body that moves, exactly a burst with wrong times is left out; poses that come late are not.
 RC_GTEST_PROP(PoseConflict, FindsABurstOfWrongTimesAlone, ()) {
   const auto length = *rc::gen::inRange<std::size_t>(1, 900);
-  const auto at = *rc::gen::inRange<std::size_t>(length + 1, 3999 - 2 * length);
+  // More right poses than wrong ones lie on each side, also without the one that comes late.
+  const auto at = *rc::gen::inRange<std::size_t>(length + 2, 3998 - 2 * length);
   const auto shift_ms = *rc::gen::oneOf(rc::gen::inRange<std::int64_t>(1000, 400'000'000),
                                         rc::gen::inRange<std::int64_t>(-400'000'000, -1000));
+  // Within a second before or after the motion, nothing tells that the times are wrong.
+  const auto first_ms = static_cast<std::int64_t>(at) + shift_ms;
+  const auto last_ms = first_ms + static_cast<std::int64_t>(length) - 1;
+  RC_PRE(!(first_ms >= -1000 && last_ms < 0) && !(first_ms > 3999 && last_ms <= 4999));
   const auto comes_late = *rc::gen::element<std::size_t>(0, 1, 20);  // poses later
   const auto late = *rc::gen::inRange<std::size_t>(0, 3900);
   std::vector<StampedPose> poses;
