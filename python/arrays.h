@@ -20,6 +20,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -161,22 +162,38 @@ inline std::vector<StampedPose> stampedPoses(const py::array_t<std::int64_t>& t_
 }
 
 /// Calls that run without the interpreter's lock. At its exit, Python kills threads that ask for
-/// the lock again, and C++ cannot bear that: the exit waits until there are no such calls.
+/// the lock again, and C++ cannot bear that: the exit waits until there are no such calls, and a
+/// call of another thread after that, perhaps a daemon that asks for the state, does not return.
 class ReleasedCalls {
  public:
   static std::atomic<int>& count() {
     static std::atomic<int> calls = 0;
     return calls;
   }
-  static std::atomic<bool>& ending() {
-    static std::atomic<bool> exits = false;
-    return exits;
+  static bool ending() { return endingThread() != std::thread::id(); }
+  /// Waits for the calls of all threads. Only this thread may call then.
+  static void end() {
+    endingThread() = std::this_thread::get_id();
+    const py::gil_scoped_release released;
+    while (count() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 
-  ReleasedCalls() { ++count(); }
+  ReleasedCalls() {
+    if (ending() && endingThread() != std::this_thread::get_id()) {
+      PyEval_SaveThread();
+      while (true) std::this_thread::sleep_for(std::chrono::hours(1));
+    }
+    ++count();
+  }
   ~ReleasedCalls() { --count(); }
   ReleasedCalls(const ReleasedCalls&) = delete;
   ReleasedCalls& operator=(const ReleasedCalls&) = delete;
+
+ private:
+  static std::atomic<std::thread::id>& endingThread() {
+    static std::atomic<std::thread::id> thread{};
+    return thread;
+  }
 };
 
 /// Releases the interpreter's lock for a call. It is counted until it has the lock again.

@@ -453,11 +453,7 @@ PYBIND11_MODULE(_engine, module) {
   defineJobs(module);
   defineExperiments(module);
   // At Python's exit, after the mappers are stopped.
-  module.def("wait_for_calls", [] {
-    ReleasedCalls::ending() = true;
-    const py::gil_scoped_release released;
-    while (ReleasedCalls::count() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  });
+  module.def("wait_for_calls", &ReleasedCalls::end);
 }
 
 }  // namespace efm

@@ -38,15 +38,25 @@ class ProgramTest : public TemporaryFolder {
         ("cd '" + folder().string() + "' && " + command + " </dev/null >stdout.txt 2>stderr.txt")
             .c_str()));
   }
+  /// Leaves out the progress, which a slow run prints.
   /// @param status from waitpid.
   Result resultOf(int status) const {
     Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"), ""};
     std::istringstream err(contentOf("stderr.txt"));
     for (std::string line; std::getline(err, line);) {
+      if (isProgress(line)) continue;
       const bool note = line.rfind("event-fusion: note: poses-unchecked", 0) == 0;
       (note ? result.notes : result.err) += line + (err.eof() ? "" : "\n");
     }
     return result;
+  }
+  /// Returns whether a line is like "event-fusion: first look  43 %, 12 s left".
+  static bool isProgress(const std::string& line) {
+    const std::string begin = "event-fusion: ";
+    const std::size_t percent = line.find(" %");
+    return line.rfind(begin, 0) == 0 && percent != std::string::npos &&
+           line.find(':', begin.size()) > percent &&
+           (percent + 2 == line.size() || line[percent + 2] == ',');
   }
   /// Runs event-fusion. Arguments are quoted as in a shell.
   virtual Result run(const std::string& arguments) const {

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -29,11 +30,12 @@ class TemporaryFolder : public testing::Test {
  protected:
   TemporaryFolder() {
     const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              ("efm_" + std::string(test->test_suite_name()) + "_" + test->name() + "_" +
-               std::to_string(getpid()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
+    std::string name =
+        std::string("efm_") + test->test_suite_name() + "_" + test->name() + "_XXXXXX";
+    std::replace(name.begin(), name.end(), '/', '_');  // of a test with parameters
+    name = (std::filesystem::temp_directory_path() / name).string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error(name + ": not made");
+    folder_ = name;
   }
   ~TemporaryFolder() override {
     std::error_code ignored;

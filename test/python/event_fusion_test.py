@@ -766,6 +766,15 @@ mapper.add_recording(desk)
 threading.Thread(target=mapper.finish, daemon=True).start()
 time.sleep(0.05)
 """,
+    "a daemon thread asks": """
+mapper = ef.Mapper({**OPTIONS, "live.enabled": True})
+mapper.add_recording(desk)
+def poll():
+    while True:
+        mapper.status, mapper.points
+threading.Thread(target=poll, daemon=True).start()
+time.sleep(0.1)
+""",
     "a daemon thread maps in playback": """
 mapper = ef.Mapper(OPTIONS)
 threading.Thread(target=lambda: (mapper.add_recording(desk), mapper.finish()), daemon=True).start()

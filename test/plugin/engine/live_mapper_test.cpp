@@ -71,7 +71,7 @@ TEST(LiveMapper, StopWaitsForTheCallbackAndFinishReturnsAfterIt) {
     Mapper::Callbacks callbacks;
     callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
       if (calls++ == 0) within.set_value();
-      for (int k = 0; k < 200; k += ends ? 1 : 0) {
+      for (int k = 0; k < 2000; k += ends ? 1 : 0) {
         user->points();
         user->status();
         std::this_thread::sleep_for(std::chrono::microseconds(100));

@@ -9,6 +9,7 @@
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
+#include <unistd.h>
 
 #include <Eigen/Eigenvalues>
 #include <atomic>
@@ -122,7 +123,7 @@ TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
     options.refinement.enabled = is_refined;
     options.refinement.refiner.adapt_tracker = false;
     EventFusionOptions with_session = options;
-    with_session.session_file = testing::TempDir() + "builder.mcap";
+    with_session.session_file = testing::TempDir() + "builder" + std::to_string(getpid()) + ".mcap";
     CEventFusionMapBuilder builder(with_session);
     play(builder, observations);
     mrpt::maps::CSimpleMap initial;
