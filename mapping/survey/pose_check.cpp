@@ -322,8 +322,8 @@ class PoseCheck {
       const auto camera = static_cast<std::size_t>(cameras[i]);
       candidate.finding.camera = camera;
       const auto gainsOf = [&](double shift_s, std::size_t count, double least = 0) {
-        return gainsOfFirst(count, least, [&](std::size_t i) -> std::optional<double> {
-          SamplePiece piece = pieces_[i];
+        return gainsOfFirst(count, least, [&](std::size_t p) -> std::optional<double> {
+          SamplePiece piece = pieces_[p];
           for (Event& event : piece.events[camera]) event.t_ns += durationFromSeconds(shift_s);
           return sharpness_.of(piece, piece.trajectory);
         });

@@ -19,10 +19,6 @@
 #include "plugin/session_file/keyframe_record.h"
 
 namespace efm {
-namespace {
-
-namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 class Sha256 {
  public:
@@ -39,6 +35,11 @@ class Sha256 {
  private:
   std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context_{EVP_MD_CTX_new(), EVP_MD_CTX_free};
 };
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 /// @return null if the file cannot be read.
 Json identityOf(const fs::path& file, const std::string& name) {

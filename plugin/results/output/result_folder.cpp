@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kReport = "report.json";
-constexpr const char* kKeyframes = "keyframes";
+constexpr const char* kKeyframesFolder = "keyframes";
 constexpr const char* kLock = "run.lock";
 constexpr const char* kStatus = "status.json";  // of a shard or a join
 constexpr const char* kNewStatus = "status.json.new";
@@ -88,7 +88,7 @@ bool isFileOf(Level level, const std::string& name, Kinds kinds) {
 }
 
 std::optional<Level> folderOf(Level level, const std::string& name, Kinds kinds) {
-  if (level == Level::kResult && kinds.map && name == kKeyframes) return Level::kKeyframes;
+  if (level == Level::kResult && kinds.map && name == kKeyframesFolder) return Level::kKeyframes;
   if (level == Level::kKeyframes && isKeyframeFolder(name)) return Level::kKeyframe;
   const bool has_cameras = level == Level::kKeyframe || (level == Level::kResult && kinds.depth);
   if (has_cameras && isCameraFolder(name)) return Level::kCamera;
@@ -432,7 +432,8 @@ void ResultFolder::require(const fs::path& out, OutputKind kind, bool force) {
   rejectInTheWay(places.target, kindsOf(kind));
   if (force) return;
   const auto has = [&](std::string_view name) { return fs::exists(places.target / name); };
-  const bool has_map = has(kKeyframes) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
+  const bool has_map =
+      has(kKeyframesFolder) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
   const bool has_depth = std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
                          std::any_of(kImages.begin(), kImages.end(), has);
   if (!earlierResult(places.target)) {
@@ -514,7 +515,7 @@ void ResultFolder::takeStored(const fs::path& from) {
   setAside();
   fs::copy_file(from / kSession, places_.partial / kSession);
   for (const fs::path& file : filesIn(from, kindsOf(kind_)).files) {
-    if (file.begin()->string() != kKeyframes) continue;
+    if (file.begin()->string() != kKeyframesFolder) continue;
     fs::create_directories((places_.partial / file).parent_path());
     std::error_code error;
     fs::create_hard_link(from / file, places_.partial / file, error);

@@ -99,7 +99,7 @@ void write(const fs::path& folder, const Files& files) {
   for (const auto& [name, content] : files) writeFile(folder / name, content);
 }
 
-const Files kOthers = {{"notes.txt", "mine"}, {"keyframes/readme.txt", "mine"}};
+const Files kFilesOfOthers = {{"notes.txt", "mine"}, {"keyframes/readme.txt", "mine"}};
 
 Files together(Files files, const Files& others) {
   files.insert(others.begin(), others.end());
@@ -142,7 +142,8 @@ class EachBefore : public ResultFolderTest, public testing::WithParamInterface<B
     fs::create_directories(target);
     if (GetParam() == Before::kLink) fs::create_directory_symlink("target", out());
     Files files;
-    if (GetParam() == Before::kOthers || GetParam() == Before::kResultAndOthers) files = kOthers;
+    if (GetParam() == Before::kOthers || GetParam() == Before::kResultAndOthers)
+      files = kFilesOfOthers;
     if (GetParam() != Before::kEmpty && GetParam() != Before::kOthers) {
       files = together(resultOf("old", 3), files);
     }
@@ -154,7 +155,9 @@ class EachBefore : public ResultFolderTest, public testing::WithParamInterface<B
   }
   fs::path out() const { return folder() / "a" / "out"; }
   /// The new result, beside the files of others.
-  Files made() const { return together(resultOf("the new run"), hasOthers() ? kOthers : Files()); }
+  Files made() const {
+    return together(resultOf("the new run"), hasOthers() ? kFilesOfOthers : Files());
+  }
 };
 
 INSTANTIATE_TEST_SUITE_P(All, EachBefore,
@@ -217,7 +220,7 @@ TEST_P(EachBefore, AKilledRunLeavesOneOfBothResultsWhole) {
       if (exchange_error == EBUSY) run(out(), "a run that may be in place");
       run(out(), "a third run");
       EXPECT_EQ(filesBelow(out()),
-                together(resultOf("a third run"), hasOthers() ? kOthers : Files()));
+                together(resultOf("a third run"), hasOthers() ? kFilesOfOthers : Files()));
       const auto entries = fs::directory_iterator(folder() / "a");
       EXPECT_EQ(std::distance(begin(entries), end(entries)), GetParam() == Before::kLink ? 2 : 1);
       if (HasFailure()) return;
@@ -251,10 +254,10 @@ TEST_F(ResultFolderTest, FilesThatCameMeanwhileStay) {
   {
     ResultFolder result(out, OutputKind::kMap);
     write(result.path(), resultOf("new"));
-    write(out, kOthers);
+    write(out, kFilesOfOthers);
     result.commit();
   }
-  EXPECT_EQ(filesBelow(out), together(resultOf("new"), kOthers));
+  EXPECT_EQ(filesBelow(out), together(resultOf("new"), kFilesOfOthers));
   EXPECT_EQ(filesBelow(folder()).size(), filesBelow(out).size());
 }
 
@@ -340,7 +343,9 @@ TEST_F(ResultFolderTest, FoldersThatNoRunHasMadeAreNotTouched) {
       }
       EXPECT_EQ(fs::symlink_status(path).type(), before);
       EXPECT_FALSE(fs::exists(out));
-      if (fs::is_directory(path)) EXPECT_EQ(filesBelow(path), resultOf("a user's own"));
+      if (fs::is_directory(path)) {
+        EXPECT_EQ(filesBelow(path), resultOf("a user's own"));
+      }
       fs::remove_all(path);
     }
   }
@@ -465,7 +470,7 @@ TEST_F(ResultFolderTest, FoldersThatAreNotForAResultAreNamed) {
   fs::remove(out);
   fs::create_symlink("nowhere", out);
   EXPECT_THAT(message(OutputKind::kMap), HasSubstr("a link to a folder that does not exist"));
-  EXPECT_THAT(messageOf([&] { ResultFolder result("", OutputKind::kMap); }),
+  EXPECT_THAT(messageOf([&] { ResultFolder("", OutputKind::kMap); }),
               HasSubstr("'': expected the name of the folder"));
 }
 
