@@ -166,34 +166,28 @@ inline std::vector<StampedPose> stampedPoses(const py::array_t<std::int64_t>& t_
 /// call of another thread after that, perhaps a daemon that asks for the state, does not return.
 class ReleasedCalls {
  public:
-  static std::atomic<int>& count() {
-    static std::atomic<int> calls = 0;
-    return calls;
-  }
-  static bool ending() { return endingThread() != std::thread::id(); }
+  static bool ending() { return ending_thread_.load() != std::thread::id(); }
   /// Waits for the calls of all threads. Only this thread may call then.
   static void end() {
-    endingThread() = std::this_thread::get_id();
+    ending_thread_ = std::this_thread::get_id();
     const py::gil_scoped_release released;
-    while (count() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (count_ > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 
   ReleasedCalls() {
-    if (ending() && endingThread() != std::this_thread::get_id()) {
+    if (ending() && ending_thread_.load() != std::this_thread::get_id()) {
       PyEval_SaveThread();
       while (true) std::this_thread::sleep_for(std::chrono::hours(1));
     }
-    ++count();
+    ++count_;
   }
-  ~ReleasedCalls() { --count(); }
+  ~ReleasedCalls() { --count_; }
   ReleasedCalls(const ReleasedCalls&) = delete;
   ReleasedCalls& operator=(const ReleasedCalls&) = delete;
 
  private:
-  static std::atomic<std::thread::id>& endingThread() {
-    static std::atomic<std::thread::id> thread{};
-    return thread;
-  }
+  inline static std::atomic<int> count_ = 0;
+  inline static std::atomic<std::thread::id> ending_thread_{};
 };
 
 /// Releases the interpreter's lock for a call. It is counted until it has the lock again.

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "plugin/options/option_keys.h"
 #include "plugin/engine/first_look.h"
+#include "plugin/options/option_keys.h"
 #include "plugin/results/output/report.h"
 #include "plugin/session/session_status.h"
 

@@ -41,8 +41,8 @@ class RecordingKeyframes {
   struct Host {
     /// Returns whether the recording is to end here. May be empty; its exceptions end the run.
     std::function<bool()> stop;
-    std::function<void(double fraction)>
-        on_progress;  ///< Called after each sample, and each planned keyframe; may be empty.
+    /// Called after each sample, and before each planned keyframe. May be empty.
+    std::function<void(double fraction)> on_progress;
     DsiSink* sink = nullptr;  ///< Receives every fused plane; may be null.
     /// What a pass over all events counted, if this run reads none; else null.
     const EventPass* known = nullptr;

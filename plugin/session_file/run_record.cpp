@@ -20,6 +20,7 @@
 
 namespace efm {
 
+/// Has a name outside of this file, because a member of MapHasher has it.
 class Sha256 {
  public:
   Sha256() { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }

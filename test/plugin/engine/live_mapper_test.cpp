@@ -196,12 +196,17 @@ TEST(LiveMapper, PosesWaitTenMinutesForEvents) {
   EXPECT_EQ(session.status().poses->first_ns, at(-601).t_ns);
 }
 
-TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
-  const SyntheticRecording recording(3);
+/// Returns options that are chosen from the data, and fit into a small queue.
+EventFusionOptions chosenFor(int max_queue_events) {
   EventFusionOptions options = live();
   options.automatic = defaultOptions().automatic;
-  options.live.max_queue_events = 1000;
-  MapperOfRig mapper(options);
+  options.live.max_queue_events = max_queue_events;
+  return options;
+}
+
+TEST(LiveMapper, ChosenWindowsFillAtMostHalfOfTheQueue) {
+  const SyntheticRecording recording(3);
+  MapperOfRig mapper(chosenFor(1000));
   play(mapper, samplesOf(recording));
 
   const SessionStatus status = mapper.status();
@@ -231,10 +236,7 @@ TEST(LiveMapper, OptionsAreChosenFromEventsOfOneTime) {
   SyntheticRecording recording(0.3);
   const Event event{SyntheticRecording::kStartNs + 105 * kMsNs, 60, 40, true};
   for (std::vector<Event>& events : recording.events) events.assign(10, event);
-  EventFusionOptions options = live();
-  options.automatic = defaultOptions().automatic;
-  options.live.max_queue_events = 1000;
-  MapperOfRig mapper(options);
+  MapperOfRig mapper(chosenFor(1000));
   play(mapper, samplesOf(recording));
   const SessionStatus status = mapper.status();
   expectSumsAgree(status);
@@ -251,11 +253,10 @@ TEST(LiveMapper, AWindowThatTheQueueCannotHoldIsShortenedIfItWasChosenOrElseAnEr
     packet->events = CheckedEvents(std::move(events));
   }
   for (const bool is_chosen : {true, false}) {
-    EventFusionOptions options = live();
+    EventFusionOptions options = chosenFor(2000);
     options.mapper.policy.window_s = options.mapper.policy.stride_s = is_chosen ? 0.2 : 0.5;
-    if (is_chosen) options.automatic = defaultOptions().automatic;
+    if (!is_chosen) options.automatic = {};
     options.live.max_event_rate = 0;
-    options.live.max_queue_events = 2000;
     MapperLog log;
     MapperOfRig mapper(options, log.callbacks());
     play(mapper, samples);
